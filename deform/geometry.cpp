@@ -15,6 +15,11 @@
 
 namespace tetwarp {
 
+AffineMap inverse_of(const AffineMap& map) {
+  const glm::dmat3 inverse = glm::inverse(map.linear);
+  return {inverse, -(inverse * map.offset)};
+}
+
 AffineMap point_from_index(const Geometry& geometry) {
   glm::dmat3 linear = geometry.direction;
   for (int axis = 0; axis < 3; ++axis) linear[axis] *= geometry.spacing[axis];
@@ -25,8 +30,7 @@ AffineMap index_from_point(const Geometry& geometry) {
   const AffineMap forward = point_from_index(geometry);
   const double volume = glm::determinant(forward.linear);
   require(std::isfinite(volume) && volume != 0, "the grid's spacing and direction have no inverse");
-  const glm::dmat3 inverse = glm::inverse(forward.linear);
-  return {inverse, -(inverse * forward.offset)};
+  return inverse_of(forward);
 }
 
 std::int64_t voxel_count(const Geometry& geometry) { return geometry.size.x * geometry.size.y * geometry.size.z; }

@@ -43,6 +43,9 @@ struct AffineMap {
   AffineMap operator*(const AffineMap& first) const { return {linear * first.linear, linear * first.offset + offset}; }
 };
 
+/// The inverse of a map whose linear part has one; not finite without.
+AffineMap inverse_of(const AffineMap& map);
+
 /// The map from continuous index to LPS mm. Of a grid with `slices` it is that of the even stack.
 AffineMap point_from_index(const Geometry& geometry);
 /// The map from LPS mm to continuous index. Of a grid with `slices` it is that of the even stack.

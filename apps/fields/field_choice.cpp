@@ -33,42 +33,40 @@ NamedField parse_named_formula(const std::string& text) {
   return formula;
 }
 
-/// A file with its options, and whether it is a mesh.
-struct ParsedFile {
-  FieldSource source;
-  bool is_mesh = false;
-};
-
-ParsedFile parse_file(const std::string& text, NiftiFrame frame) {
-  ParsedFile file{as_usage([&] { return parse_field_source(text); })};
-  file.source.nifti_frame = frame;
-  file.is_mesh = is_mesh_file(file.source.path);  // a file that cannot be read is no mistake of the command line
-  as_usage([&] {
-    if (file.is_mesh) return check_mesh_options(file.source);
-    is_transform_file(file.source.path) ? check_transform_options(file.source) : check_field_options(file.source);
-  });
-  return file;
+/// The file of a field, whatever it holds; null: it is a formula.
+const FieldSource* file_of(const NamedField& field) {
+  const auto* transform = std::get_if<NamedTransform>(&field.what);
+  return transform ? &transform->file : source_of(field);
 }
 
-/// The field that a text names which is no formula: a file.
-NamedField named_file(const std::string& text, ParsedFile file) {
-  if (is_transform_file(file.source.path)) return {text, NamedTransform{std::move(file.source)}};
-  if (file.is_mesh) return {text, NamedMesh{std::move(file.source)}};
-  return {text, NamedLattice{std::move(file.source)}};
+/// The field that a text names which is no formula: a file, with its options.
+NamedField parse_named_file(const std::string& text, NiftiFrame frame) {
+  FieldSource file = as_usage([&] { return parse_field_source(text); });
+  file.nifti_frame = frame;
+  const bool is_mesh = is_mesh_file(file.path);  // a file that cannot be read is no mistake of the command line
+  if (is_transform_file(file.path)) {
+    as_usage([&] { check_transform_options(file); });
+    return {text, NamedTransform{std::move(file)}};
+  }
+  if (is_mesh) {
+    as_usage([&] { check_mesh_options(file); });
+    return {text, NamedMesh{std::move(file)}};
+  }
+  as_usage([&] { check_field_options(file); });
+  return {text, NamedLattice{std::move(file)}};
 }
 
 NamedField parse_forward_field(const std::string& text, NiftiFrame frame) {
   if (is_formula(text)) return parse_named_formula(text);
-  ParsedFile file = parse_file(text, frame);
-  if (kind_at(file.source.path) == PathKind::nothing)
+  NamedField file = parse_named_file(text, frame);
+  if (kind_at(file_of(file)->path) == PathKind::nothing)
     throw UsageError("\"" + text + "\" is neither a formula nor a file that exists; see tetwarp deform --help");
-  return named_file(text, std::move(file));
+  return file;
 }
 
 /// What a field is called: a formula by its text, a file without its folder.
 std::string title_of(const NamedField& field) {
-  if (const auto* transform = std::get_if<NamedTransform>(&field.what)) return transform->file.path.filename().string();
-  const FieldSource* file = source_of(field);
+  const FieldSource* file = file_of(field);
   return file ? file->path.filename().string() : field.text;
 }
 
@@ -130,7 +128,9 @@ std::string title_without_names(const FieldChoice& field) {
   });
 }
 
-FieldSource parse_field_file(const std::string& text, NiftiFrame frame) { return parse_file(text, frame).source; }
+FieldSource parse_field_file(const std::string& text, NiftiFrame frame) {
+  return *file_of(parse_named_file(text, frame));
+}
 
 ForwardChoice parse_forward_fields(const std::vector<std::string>& texts, std::optional<std::int64_t> cell_size,
                                    NiftiFrame frame) {
@@ -165,7 +165,7 @@ PullChoice parse_pull_fields(const std::vector<std::string>& texts, NiftiFrame f
   if (texts.empty()) throw UsageError("no field; give --pull-field FILE");
   PullChoice parsed;
   for (const std::string& text : texts) {
-    parsed.fields.push_back(named_file(text, parse_file(text, frame)));
+    parsed.fields.push_back(parse_named_file(text, frame));
     if (std::holds_alternative<NamedMesh>(parsed.fields.back().what))
       throw InputError("a mesh, " + text + ", says where its vertices go; give it with -f");
   }

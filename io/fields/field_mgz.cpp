@@ -9,11 +9,12 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <glm/common.hpp>
-#include <glm/matrix.hpp>
 #include <glm/vector_relational.hpp>
-#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "deform/errors.h"
 #include "io/images/image_reader.h"

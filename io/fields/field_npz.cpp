@@ -5,6 +5,9 @@
 
 #include <unzip.h>
 
+#include <algorithm>
+#include <array>
+#include <memory>
 #include <sstream>
 #include <vector>
 

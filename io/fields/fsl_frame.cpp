@@ -23,10 +23,6 @@ AffineMap index_from_fsl(const Geometry& image) {
 
 AffineMap lps_from_fsl(const Geometry& image) { return point_from_index(image) * index_from_fsl(image); }
 
-AffineMap fsl_from_lps(const Geometry& image) {
-  const AffineMap map = index_from_fsl(image);
-  const glm::dmat3 inverse = glm::inverse(map.linear);
-  return AffineMap{inverse, -(inverse * map.offset)} * index_from_point(image);
-}
+AffineMap fsl_from_lps(const Geometry& image) { return inverse_of(index_from_fsl(image)) * index_from_point(image); }
 
 }  // namespace tetwarp

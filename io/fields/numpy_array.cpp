@@ -8,8 +8,6 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 
 #include "deform/errors.h"
 #include "io/images/image_reader.h"

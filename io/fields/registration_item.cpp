@@ -3,6 +3,7 @@
 
 #include "io/fields/registration_item.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,7 @@
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
+#include "io/fields/transform_matrix.h"
 
 namespace tetwarp {
 
@@ -81,7 +83,7 @@ AffineMap matrix_of(DcmItem& item, const DcmTagKey& where, const std::string& fi
   const std::vector<double> m = RegistrationValues(item, file).numbers(DCM_FrameOfReferenceTransformationMatrix, 16);
   require(m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1,
           "the last row of the matrix of " + tag_name(where) + " is not 0 0 0 1, " + file);
-  return {glm::dmat3(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]), {m[3], m[7], m[11]}};
+  return map_of_rows(std::span<const double, 16>(m));
 }
 
 AffineMap matrix_in(DcmItem& item, const DcmTagKey& sequence, const std::string& file) {

@@ -3,6 +3,7 @@
 
 #include "io/transform_file.h"
 
+#include <cmath>
 #include <fstream>
 #include <glm/matrix.hpp>
 
@@ -33,6 +34,24 @@ const TransformFormat& format_of(const FieldSource& source) {
   return *format;
 }
 
+/// Checks the option that all formats have.
+void check_invert(const FieldSource& source) {
+  const std::string inverse = source.option("invert", "no");
+  require(inverse == "yes" || inverse == "no",
+          "invert=" + inverse + ", " + source.path.string() + "; expected yes or no");
+}
+
+/// Checks the other options.
+void check_options(const TransformFormat& format, const FieldSource& source) {
+  FieldSource others = source;
+  others.options.erase("invert");
+  if (format.check_options) return format.check_options(others);
+  require(others.options.empty(), [&] {
+    return "the option \"" + others.options.begin()->first + "\", " + source.path.string() +
+           "; expected invert, or none";
+  });
+}
+
 /// The map of an affine transform. Its columns are differences over 200 mm, so that rounding stays below that of the
 /// numbers themselves.
 AffineMap map_of(const TransformFile& transform) {
@@ -53,8 +72,7 @@ void invert(TransformFile& transform, const std::string& file) {
                                 "writes, or use tetwarp invert");
   const AffineMap map = map_of(transform);
   require(std::abs(glm::determinant(map.linear)) > 1e-9, "invert=yes, " + file + ": the matrix has no inverse");
-  const glm::dmat3 inverse = glm::inverse(map.linear);
-  transform.displacement = affine_transform({inverse, -(inverse * map.offset)}).displacement;
+  transform.displacement = affine_transform(inverse_of(map)).displacement;
   transform.classes.insert(transform.classes.begin(), "inverse of");
   // Whoever inverts a transform knows in which of its two volumes points begin.
   transform.direction.reset();
@@ -77,15 +95,8 @@ bool is_transform_file(const std::filesystem::path& path) {
 }
 
 void check_transform_options(const FieldSource& source) {
-  const std::string inverse = source.option("invert", "no"), file = source.path.string();
-  require(inverse == "yes" || inverse == "no", "invert=" + inverse + ", " + file + "; expected yes or no");
-  if (!is_file(source.path)) return;  // whoever reads it says so
-  FieldSource others = source;
-  others.options.erase("invert");
-  const TransformFormat& format = format_of(source);
-  if (format.check_options) return format.check_options(others);
-  require(others.options.empty(), "the option \"" + (others.options.empty() ? "" : others.options.begin()->first) +
-                                      "\", " + file + "; expected invert, or none");
+  check_invert(source);
+  if (is_file(source.path)) check_options(format_of(source), source);  // else whoever reads it says so
 }
 
 std::vector<std::filesystem::path> files_of_transform(const FieldSource& source) {
@@ -96,8 +107,10 @@ std::vector<std::filesystem::path> files_of_transform(const FieldSource& source)
 }
 
 TransformFile read_transform_file(const FieldSource& source, const std::stop_token& stop) {
-  check_transform_options(source);
-  TransformFile transform = format_of(source).read(source, stop);
+  check_invert(source);
+  const TransformFormat& format = format_of(source);
+  if (is_file(source.path)) check_options(format, source);
+  TransformFile transform = format.read(source, stop);
   if (source.option("invert") == "yes") invert(transform, source.path.string());
   return transform;
 }

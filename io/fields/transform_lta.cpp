@@ -3,12 +3,13 @@
 
 #include "io/fields/transform_lta.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <fstream>
-#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <map>
+#include <sstream>
 
 #include "deform/errors.h"
 #include "io/fields/transform_matrix.h"
@@ -101,11 +102,6 @@ AffineMap read_volume(Lines& lines, const std::string& which) {
           "the axes of the " + which + " volume have no inverse" + lines.here());
   map.offset = centre - map.linear * (glm::dvec3(size[0], size[1], size[2]) / 2.0);
   return map;
-}
-
-AffineMap inverse_of(const AffineMap& map) {
-  const glm::dmat3 inverse = glm::inverse(map.linear);
-  return {inverse, -(inverse * map.offset)};
 }
 
 bool recognizes(const std::filesystem::path& path, std::string_view) {

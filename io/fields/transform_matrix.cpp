@@ -8,7 +8,6 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <glm/matrix.hpp>
 
 #include "deform/errors.h"
 #include "io/fields/fsl_frame.h"
@@ -50,7 +49,7 @@ AffineMap map_of(std::span<const double, 16> m, const std::string& file) {
           "a value that is not finite, " + file);
   require(m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1,
           "a last row other than 0 0 0 1, " + file + "; expected a 4 x 4 matrix, row by row");
-  return {glm::dmat3(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]), {m[3], m[7], m[11]}};
+  return map_of_rows(m);
 }
 
 /// A program, as the option `tool` names it.

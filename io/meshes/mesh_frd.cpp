@@ -7,6 +7,7 @@
 #include <array>
 #include <fstream>
 #include <limits>
+#include <optional>
 
 #include "deform/errors.h"
 #include "io/lower_case.h"
