@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -57,7 +58,8 @@ struct FieldFileHeader {
 /// A field file, with everything that has to be said of it because the file does not.
 struct FieldSource {
   /// A file that needs no options; not explicit, because most files need none.
-  FieldSource(std::filesystem::path file) : path(std::move(file)) {}  // NOLINT
+  template <std::convertible_to<std::filesystem::path> Path>
+  FieldSource(Path&& file) : path(std::forward<Path>(file)) {}  // NOLINT
 
   std::filesystem::path path;  ///< the file
   /// Key and value, such as "order" and "zyx"; docs/reference/fields.md lists them by format.
