@@ -11,6 +11,8 @@
 #include <string>
 #include <string_view>
 
+#include "deform/text_number.h"
+
 namespace tetwarp {
 
 /// The way messages show a number: six significant digits, "-0" as "0".
@@ -39,11 +41,8 @@ inline std::string stated_number(std::string_view text) {
 
 /// A Decimal String (PS3.5 6.2) whatever the locale; none unless all of it is one finite number.
 inline std::optional<double> decimal(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
+  const auto value = number_from<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 }  // namespace tetwarp

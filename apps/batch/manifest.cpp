@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <optional>
 #include <set>
 
@@ -15,6 +14,7 @@
 #include "apps/cli/command_line.h"
 #include "apps/cli/reads.h"
 #include "apps/deform/deform_request.h"
+#include "deform/text_number.h"
 #include "io/edit_distance.h"
 #include "io/lower_case.h"
 #include "io/opened_file.h"
@@ -75,12 +75,11 @@ std::string problem_of_id(const std::string& id) {
 template <class Number>
 Number whole_number(const ManifestRow& row, const std::string& key, Number least, Number most) {
   const std::string text = row.text(key);
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  require(error == std::errc() && end == text.data() + text.size() && number >= least && number <= most,
+  const auto number = number_from<Number>(text);
+  require(number && *number >= least && *number <= most,
           key + " is \"" + shown(text) + "\"; a whole number from " + std::to_string(least) + " to " +
               std::to_string(most) + " is expected");
-  return number;
+  return *number;
 }
 
 /// The folders to which the paths of a row are relative.

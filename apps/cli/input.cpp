@@ -4,10 +4,10 @@
 #include "apps/cli/input.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
+#include "deform/text_number.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_text.h"
 #include "io/hash.h"
@@ -33,11 +33,8 @@ std::string list_series(const DicomScan& scan, const std::optional<std::string>&
 /// The series that --series names.
 const DicomSeries& named_series(const DicomScan& scan, const InputOptions& options) {
   const std::string where = shown(options.path), name = shown(options.series);
-  std::size_t number = 0;
-  const char* const end = options.series.data() + options.series.size();
-  if (std::from_chars(options.series.data(), end, number).ptr == end && number >= 1 && number <= scan.series.size()) {
-    return scan.series[number - 1];
-  }
+  const std::size_t number = number_from<std::size_t>(options.series).value_or(0);
+  if (number >= 1 && number <= scan.series.size()) return scan.series[number - 1];
   const auto is_named = [&](const DicomSeries& series) { return series.series_uid == options.series; };
   const auto found = std::find_if(scan.series.begin(), scan.series.end(), is_named);
   require(found != scan.series.end(), "no series \"" + name + "\", " + where + "; choose one of" + list_series(scan));

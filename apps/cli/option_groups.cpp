@@ -4,12 +4,12 @@
 #include "apps/cli/option_groups.h"
 
 #include <cfloat>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
 
 #include "apps/cli/input.h"
+#include "deform/text_number.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {
@@ -21,15 +21,6 @@ namespace {
 constexpr std::int64_t kMostThreads = 65536, kMostDevices = 65535;
 /// A lattice with larger cells has one cell an axis, of whatever volume.
 constexpr std::int64_t kMostCellSize = 65536;
-
-template <class Number>
-std::optional<Number> number_of(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
 
 CLI::Validator check(const std::string& expected, std::function<bool(const std::string&)> is_good) {
   return {[expected, is_good](std::string& text) {
@@ -54,7 +45,7 @@ std::optional<std::uint64_t> bytes_of(const std::string& text) {
   constexpr double kMost = 0x1p62;
   const std::size_t end = std::min(text.find_first_not_of("0123456789."), text.size()),
                     unit = std::min(text.find_first_not_of(' ', end), text.size());
-  const std::optional<double> number = number_of<double>(text.substr(0, end)), factor = factor_of(text.substr(unit));
+  const std::optional<double> number = number_from<double>(text.substr(0, end)), factor = factor_of(text.substr(unit));
   if (end == 0 || !number || !factor) return std::nullopt;
   const double bytes = std::floor(*number * *factor);
   if (!(bytes >= 1 && bytes <= kMost)) return std::nullopt;
@@ -65,28 +56,28 @@ std::optional<std::uint64_t> bytes_of(const std::string& text) {
 
 CLI::Validator whole_number(std::int64_t least, std::int64_t most) {
   return check("a whole number from " + std::to_string(least) + " to " + std::to_string(most), [=](const auto& text) {
-    const auto number = number_of<std::int64_t>(text);
+    const auto number = number_from<std::int64_t>(text);
     return number && *number >= least && *number <= most;
   });
 }
 
 CLI::Validator real_number(double least, double most) {
   return check("a number from " + exact_number_text(least) + " to " + exact_number_text(most), [=](const auto& text) {
-    const auto number = number_of<double>(text);
+    const auto number = number_from<double>(text);
     return number && *number >= least && *number <= most;
   });
 }
 
 CLI::Validator finite_number() {
   return check("a finite number", [](const auto& text) {
-    const auto number = number_of<double>(text);
+    const auto number = number_from<double>(text);
     return number && std::abs(*number) <= FLT_MAX;
   });
 }
 
 CLI::Validator positive_number() {
   return check("a number greater than 0", [](const auto& text) {
-    const auto number = number_of<double>(text);
+    const auto number = number_from<double>(text);
     return number && *number > 0 && *number <= FLT_MAX;
   });
 }

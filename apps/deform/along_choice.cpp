@@ -4,10 +4,10 @@
 #include "apps/deform/along_choice.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "apps/deform/map_outputs.h"
+#include "deform/text_number.h"
 #include "io/dicom_segmentation.h"
 #include "io/dicom_structures.h"
 
@@ -30,10 +30,8 @@ std::vector<std::string> split(const std::string& text, char at) {
 }
 
 std::optional<double> number(std::string_view text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return {};
-  return value;
+  const auto value = number_from<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 /// Reads one option that follows OUT. @return whether it is one

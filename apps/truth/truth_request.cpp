@@ -4,12 +4,12 @@
 #include "apps/truth/truth_request.h"
 
 #include <algorithm>
-#include <charconv>
 #include <functional>
 #include <map>
 #include <set>
 
 #include "apps/batch/manifest_rows.h"
+#include "deform/text_number.h"
 #include "io/lower_case.h"
 
 namespace tetwarp::apps {
@@ -33,12 +33,11 @@ truth::Roles parse_roles(const std::vector<std::string>& texts) {
     std::string_view numbers = std::string_view(text).substr(equals + 1);
     while (true) {
       const std::string_view one = numbers.substr(0, numbers.find(','));
-      std::int64_t value = 0;
-      const auto [end, error] = std::from_chars(one.data(), one.data() + one.size(), value);
-      if (error != std::errc() || end != one.data() + one.size())
+      const auto value = number_from<std::int64_t>(one);
+      if (!value)
         throw UsageError("--label \"" + text + "\" holds \"" + std::string(one) + "\"; expected whole numbers");
       std::vector<std::int64_t>& labels = roles[role];
-      if (std::find(labels.begin(), labels.end(), value) == labels.end()) labels.push_back(value);
+      if (std::find(labels.begin(), labels.end(), *value) == labels.end()) labels.push_back(*value);
       if (one.size() == numbers.size()) break;
       numbers.remove_prefix(one.size() + 1);
     }
@@ -70,11 +69,10 @@ std::vector<truth::CaseChoice> cases_of(const TruthOptions& options, const truth
 /// Noise of that power; empty: it is to be measured. @throws UsageError for what is no number from 0 to 1000
 std::optional<truth::Noise> parse_noise(const std::string& text) {
   if (text == "measured") return std::nullopt;
-  double value = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value <= 1000))
+  const auto value = number_from<double>(text);
+  if (!value || !(*value >= 0 && *value <= 1000))
     throw UsageError("--noise \"" + text + "\"; expected a standard deviation of 0 to 1000 HU, or \"measured\"");
-  return truth::smoothed_noise(value);
+  return truth::smoothed_noise(*value);
 }
 
 const std::set<std::string> kLists{"label", "case", "with"};

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <fstream>
 
 #include "deform/phantom.h"
+#include "deform/text_number.h"
 #include "io/dicom_series.h"
 #include "io/image_file.h"
 
@@ -20,14 +20,12 @@ namespace {
 const DicomSeries& choose_series(const DicomScan& scan, const InputOptions& options) {
   const std::string where = options.path.string();
   const DicomSeries* found = nullptr;
-  std::size_t number = 0, matches = 0;
-  const char* const end = options.series.data() + options.series.size();
-  const auto [rest, error] = std::from_chars(options.series.data(), end, number);
-  const bool numbered = error == std::errc() && rest == end;
+  std::size_t matches = 0;
+  const auto number = number_from<std::size_t>(options.series);
   for (std::size_t n = 0; n < scan.series.size(); ++n) {
     const DicomSeries& series = scan.series[n];
     const bool meant = options.series.empty() ? !series.slices.empty()
-                                              : (numbered ? n + 1 == number : series.series_uid == options.series);
+                                              : (number ? n + 1 == *number : series.series_uid == options.series);
     if (!meant) continue;
     found = &series;
     ++matches;

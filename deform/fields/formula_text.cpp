@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <glm/common.hpp>
 #include <map>
@@ -13,6 +12,7 @@
 #include "deform/fields/elastic.h"
 #include "deform/fields/formula.h"
 #include "deform/fields/parameter_text.h"
+#include "deform/text_number.h"
 
 namespace tetwarp {
 
@@ -47,11 +47,9 @@ class Parameters {
 
   std::uint64_t whole_number(const std::string& key) {
     const std::string_view text = take(key, false);
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size())
-      fail(key + " is \"" + std::string(text) + "\", expected a whole number from 0 to 2^64 - 1");
-    return value;
+    const auto value = number_from<std::uint64_t>(text);
+    if (!value) fail(key + " is \"" + std::string(text) + "\", expected a whole number from 0 to 2^64 - 1");
+    return *value;
   }
 
   /// A length in mm. One `vox` is the spacing of the grid axis nearest to patient axis `along`, or the smallest spacing
@@ -110,12 +108,9 @@ class Parameters {
   }
 
   double parse(const std::string& key, std::string_view text) const {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-      fail(key + " is \"" + std::string(text) + "\", expected a number");
-    }
-    return value;
+    const auto value = number_from<double>(text);
+    if (!value || !std::isfinite(*value)) fail(key + " is \"" + std::string(text) + "\", expected a number");
+    return *value;
   }
 
   TypedLength parse_length(const std::string& key, std::string_view text) const {

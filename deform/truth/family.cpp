@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 
 #include "deform/errors.h"
 #include "deform/field_quality.h"
 #include "deform/fields/parameter_text.h"
+#include "deform/text_number.h"
 #include "deform/truth/motions.h"
 #include "deform/truth/slip_tube.h"
 
@@ -86,15 +86,14 @@ std::string short_text(double value) {
 }
 
 double number_of(std::string_view text, std::string_view of, const Parameter& parameter) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool fits =
-      value >= parameter.least && value <= parameter.most && (!parameter.is_whole || value == std::floor(value));
-  require(error == std::errc() && end == text.data() + text.size() && fits,
+  const auto value = number_from<double>(text);
+  const bool fits = value && *value >= parameter.least && *value <= parameter.most &&
+                    (!parameter.is_whole || *value == std::floor(*value));
+  require(fits,
           "case " + std::string(of) + ": " + std::string(parameter.name) + " is \"" + std::string(text) +
               "\"; expected a " + (parameter.is_whole ? "whole " : "") + "number from " + short_text(parameter.least) +
               " to " + short_text(parameter.most) + ", " + std::string(parameter.about));
-  return value;
+  return *value;
 }
 
 std::string folder_name(std::string_view text) {

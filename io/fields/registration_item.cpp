@@ -4,11 +4,11 @@
 #include "io/fields/registration_item.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
@@ -32,9 +32,8 @@ std::size_t registration_item(const FieldSource& source) {
   const auto found = source.options.find("item");
   if (found == source.options.end()) return 0;
   const std::string& text = found->second;
-  std::size_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  require(error == std::errc() && end == text.data() + text.size() && number >= 1,
+  const std::size_t number = number_from<std::size_t>(text).value_or(0);
+  require(number >= 1,
           "item=" + text + ", " + source.path.string() + "; expected a whole number from 1");
   return number;
 }

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <glm/matrix.hpp>
 #include <sstream>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/fields/transform_matrix.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
@@ -51,11 +51,10 @@ class Lines {
   std::vector<double> numbers(const std::string& text, std::size_t count) const {
     std::vector<double> numbers;
     for (const std::string& word : words(text)) {
-      double value = 0;
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-      require(error == std::errc() && end == word.data() + word.size() && std::isfinite(value),
+      const auto value = number_from<double>(word);
+      require(value && std::isfinite(*value),
               "\"" + word.substr(0, 40) + "\"" + here() + "; expected a finite number");
-      numbers.push_back(value);
+      numbers.push_back(*value);
     }
     require(numbers.size() == count,
             std::to_string(numbers.size()) + " numbers" + here() + "; expected " + std::to_string(count));

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/fields/fsl_frame.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
@@ -29,12 +29,11 @@ std::vector<double> read_numbers(const std::filesystem::path& path) {
     for (std::size_t at = line.find_first_not_of(kBlank); at != std::string::npos;
          at = line.find_first_not_of(kBlank, at)) {
       const std::size_t end = std::min(line.find_first_of(kBlank, at), line.size());
-      double value = 0;
-      const auto [stop, error] = std::from_chars(line.data() + at, line.data() + end, value);
-      require(error == std::errc() && stop == line.data() + end && numbers.size() < kMost,
+      const auto value = number_from<double>(std::string_view(line).substr(at, end - at));
+      require(value && numbers.size() < kMost,
               "\"" + line.substr(at, std::min<std::size_t>(end - at, 40)) + "\" in " + path.string() +
                   "; expected the 16 numbers of a 4 x 4 matrix");
-      numbers.push_back(value);
+      numbers.push_back(*value);
       at = end;
     }
   }

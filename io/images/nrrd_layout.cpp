@@ -4,11 +4,11 @@
 #include "io/images/nrrd_layout.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <limits>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/images/header_words.h"
 #include "io/lower_case.h"
 
@@ -18,12 +18,11 @@ namespace {
 /// 0 where the field is absent.
 std::int64_t whole_number(const TextHeader& text, const char* name, const std::string& file) {
   const std::string value = trimmed(text[name]);
-  std::int64_t number = 0;
-  const char* const end = value.data() + value.size();
-  require(value.empty() || std::from_chars(value.data(), end, number).ptr == end,
+  const auto number = value.empty() ? std::int64_t{0} : number_from<std::int64_t>(value);
+  require(number.has_value(),
           "the field \"" + std::string(name) + "\" is \"" + value.substr(0, 60) + "\", " + file +
               "; expected a whole number");
-  return number;
+  return *number;
 }
 
 /// Where a file goes on behind so many lines.

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <utility>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/points/points_document.h"
 
 namespace tetwarp {
@@ -120,12 +120,10 @@ Number GmshNumbers::raw() {
 
 template <class Number>
 Number GmshNumbers::parsed() {
-  const std::string_view text = word(), digits = text.starts_with('+') ? text.substr(1) : text;
-  Number value{};
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size())
-    throw InputError(shown(text) + " where a number is expected" + here());
-  return value;
+  const std::string_view text = word();
+  const auto value = number_from<Number>(text);
+  if (!value) throw InputError(shown(text) + " where a number is expected" + here());
+  return *value;
 }
 
 std::int64_t GmshNumbers::text_integer() { return parsed<std::int64_t>(); }

@@ -4,7 +4,6 @@
 #include "io/mesh_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/images/image_reader.h"
 #include "io/meshes/mesh_format.h"
 #include "io/meshes/model_builder.h"
@@ -47,11 +47,9 @@ std::unique_ptr<MeshReader> open_mesh(const std::filesystem::path& path) {
 
 std::int64_t step_of(const FieldSource& source) {
   const std::string text = source.option("step");
-  std::int64_t step = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), step);
-  require(error == std::errc() && end == text.data() + text.size(),
-          "step=" + text + " for " + source.path.string() + "; expected a whole number");
-  return step;
+  const auto step = number_from<std::int64_t>(text);
+  require(step.has_value(), "step=" + text + " for " + source.path.string() + "; expected a whole number");
+  return *step;
 }
 
 /// The name of an array for messages: "U", or "U, step 3" where there are several steps.

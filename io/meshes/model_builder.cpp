@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <limits>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 
 namespace tetwarp {
 namespace {
@@ -21,13 +21,10 @@ std::string_view without_blanks(std::string_view text) {
 
 template <class Number>
 Number number_in(std::string_view text, const char* what, const std::string& where) {
-  std::string_view word = without_blanks(text);
-  if (word.starts_with('+')) word.remove_prefix(1);  // which from_chars does not take
-  Number number{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  require(error == std::errc() && end == word.data() + word.size(),
+  const auto number = number_from<Number>(without_blanks(text));
+  require(number.has_value(),
           [&] { return "\"" + std::string(text.substr(0, 40)) + "\"" + where + "; expected " + what; });
-  return number;
+  return *number;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "deform/errors.h"
 #include "deform/geometry.h"
+#include "deform/text_number.h"
 #include "io/meshes/slicer_space.h"
 #include "io/meshes/vtk_file.h"
 #include "io/meshes/vtk_text.h"
@@ -43,12 +44,9 @@ std::string decoded(std::string_view text) {
 }
 
 double number_in(std::string_view word, const std::string& where) {
-  const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
-  double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  require(error == std::errc() && end == digits.data() + digits.size(),
-          "\"" + std::string(word.substr(0, 32)) + "\" where a number is expected" + where);
-  return value;
+  const auto value = number_from<double>(word);
+  require(value.has_value(), "\"" + std::string(word.substr(0, 32)) + "\" where a number is expected" + where);
+  return *value;
 }
 
 class LegacyFile final : public VtkFile {

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/meshes/slicer_space.h"
 
 namespace tetwarp {
@@ -65,11 +66,9 @@ double number_of(std::string_view text, const std::string& where) {
 }
 
 std::size_t count_of(std::string_view text, const std::string& where) {
-  std::size_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  require(error == std::errc{} && end == text.data() + text.size() && value <= std::size_t{1} << 40,
-          "\"" + std::string(text) + "\" where a count is expected" + where);
-  return value;
+  const auto value = number_from<std::size_t>(text);
+  require(value && *value <= std::size_t{1} << 40, "\"" + std::string(text) + "\" where a count is expected" + where);
+  return *value;
 }
 
 std::string text_of(double value) { return shortest(value); }

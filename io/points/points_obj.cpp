@@ -3,9 +3,9 @@
 
 // Reads Wavefront OBJ surfaces. Vertex normals are no longer true after a deformation, so `vn` lines and references to
 // them are left out.
-#include <charconv>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "io/points/points_document.h"
 
 namespace tetwarp {
@@ -76,11 +76,8 @@ class ObjDocument : public PointsDocument {
     for (std::size_t n = 1; n < words.size(); ++n) {
       const std::string_view word = words[n];
       const std::size_t slash = word.find('/');
-      const std::string_view number = word.substr(0, slash);
-      std::int64_t vertex = 0;
-      const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), vertex);
-      require(error == std::errc{} && end == number.data() + number.size() && vertex != 0,
-              "\"" + std::string(word) + "\" where a vertex number is expected" + where);
+      const std::int64_t vertex = number_from<std::int64_t>(word.substr(0, slash)).value_or(0);
+      require(vertex != 0, "\"" + std::string(word) + "\" where a vertex number is expected" + where);
       require(vertex > 0 || static_cast<std::size_t>(-vertex) <= points.size(),
               "a face with vertex " + std::to_string(vertex) + " after " + std::to_string(points.size()) + where);
       largest_ = std::max(largest_, static_cast<std::size_t>(std::max<std::int64_t>(vertex, 0)));

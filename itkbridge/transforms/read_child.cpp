@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
@@ -20,6 +19,7 @@
 #include <string>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "itkbridge/transforms/isolated_answer.h"
 
 namespace tetwarp {
@@ -75,8 +75,9 @@ struct Request {
 
 template <class Number>
 bool parse(std::string_view text, Number& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size();
+  const auto read = number_from<Number>(text);
+  number = read.value_or(0);
+  return read.has_value();
 }
 
 bool parse(int argc, char** argv, Request& request) {

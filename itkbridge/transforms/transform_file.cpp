@@ -4,10 +4,10 @@
 #include "itkbridge/transform_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 
 #include "deform/errors.h"
+#include "deform/text_number.h"
 #include "itkbridge/transforms/elastix_parameters.h"
 #include "itkbridge/transforms/matlab_record.h"
 #include "itkbridge/transforms/parameter_file.h"
@@ -108,11 +108,11 @@ std::vector<double> parse_numbers(std::string_view text, const std::string& wher
   for (std::size_t at = text.find_first_not_of(kBlank); at != std::string_view::npos;
        at = text.find_first_not_of(kBlank, at)) {
     const std::string_view word = text.substr(at, text.find_first_of(kBlank, at) - at);
-    double value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    require(error == std::errc() && end == word.data() + word.size(),
-            "\"" + std::string(word.substr(0, 40)) + "\" where a number is expected, " + where);
-    values.push_back(value);
+    const auto value = number_from<double>(word);
+    require(value.has_value(), [&] {
+      return "\"" + std::string(word.substr(0, 40)) + "\" where a number is expected, " + where;
+    });
+    values.push_back(*value);
     at += word.size();
   }
   return values;
