@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include "deform/enum_names.h"
 #include "deform/target_check.h"
+#include "deform/text/enum_names.h"
 
 namespace tetwarp {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 
 namespace tetwarp {
 

@@ -22,11 +22,13 @@ struct TransformFile {
   std::string tool;  ///< "ITK", "elastix", "plastimatch", "NiftyReg", "FreeSurfer", "DICOM", ...
   /// ITK: names of the classes, the last applied first; other tools: kind of transform.
   std::vector<std::string> classes;
-  std::uint64_t parameters = 0;              ///< number of parameters of all classes
-  std::optional<Direction> direction;        ///< as all transforms of the tool have it; empty: its files do not say
+  std::uint64_t parameters = 0;  ///< number of parameters of all classes
+  /// As all transforms of the tool have it; empty: its files do not say, or it was inverted.
+  std::optional<Direction> direction;
   std::string frame = "LPS";                 ///< axes of the numbers in the file: LPS, RAS, index or FSL
   FieldBasis basis = FieldBasis::by_format;  ///< how direction and frame are known
-  bool affine = false;                       ///< whether T is affine
+  bool affine = false;                       ///< whether T is affine; then it has an inverse
+  bool inverted = false;                     ///< whether the option `invert` gave the inverse of the file's transform
   PointMap displacement;  ///< T(x) - x, LPS mm, of a point x; throws InputError where that is not finite
   std::string beyond;     ///< what happens to points outside the domain, for people
   /// How often `displacement` was called for a point outside the domain of a B-spline or displacement field.

@@ -5,7 +5,7 @@
 
 #include <ostream>
 
-#include "deform/enum_names.h"
+#include "deform/text/enum_names.h"
 
 namespace tetwarp {
 

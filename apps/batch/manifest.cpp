@@ -14,7 +14,7 @@
 #include "apps/cli/command_line.h"
 #include "apps/cli/reads.h"
 #include "apps/deform/deform_request.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/edit_distance.h"
 #include "io/lower_case.h"
 #include "io/opened_file.h"
@@ -76,9 +76,9 @@ template <class Number>
 Number whole_number(const ManifestRow& row, const std::string& key, Number least, Number most) {
   const std::string text = row.text(key);
   const auto number = number_from<Number>(text);
-  require(number && *number >= least && *number <= most,
-          key + " is \"" + shown(text) + "\"; a whole number from " + std::to_string(least) + " to " +
-              std::to_string(most) + " is expected");
+  require(number && *number >= least && *number <= most, key + " is \"" + shown(text) + "\"; a whole number from " +
+                                                             std::to_string(least) + " to " + std::to_string(most) +
+                                                             " is expected");
   return *number;
 }
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/dicom_dose.h"
 #include "io/dicom_text.h"
 #include "io/hash.h"

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "apps/cli/input.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/shown_text.h"
 
 namespace tetwarp::apps {
@@ -94,10 +94,13 @@ CLI::Validator size_in_bytes() {
 
 const char* const kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 const char* const kFieldHelp =
-    "Forward field: a file (.mha .nrrd .nii .nii.gz .mgz, .npy or .npz:order=zyx|xyz,units=mm|voxel, or .vts .vti .vtr "
-    ".vtk[:displacement=NAME,frame=lps|ras,units=mm|m]), a transform of ITK, ANTs, elastix, plastimatch (.h5 .tfm .txt "
-    ".mat .toml), NiftyReg (its B-spline), FreeSurfer (.lta) or a 4 x 4 matrix (.mat:tool=greedy|c3d|niftyreg|mrtrix|"
-    "flirt; each vertex x goes to T(x)), a mesh (.msh .vtu .vtk .frd .inp, the first of several), or identity, "
+    "Forward field: a file (.mha .nrrd .mgz .nii .nii.gz[:values=displacements|positions,frame=lps|ras,source=MOVING], "
+    ".npy or .npz:order=zyx|xyz,units=mm|voxel[,key=NAME], or .vts .vti .vtr .vtk[:displacement=NAME,frame=lps|ras,"
+    "units=mm|m]), a transform of ITK, ANTs, elastix, plastimatch (.h5 .tfm .txt .mat .toml), NiftyReg (its B-spline), "
+    "FreeSurfer (.lta) or a 4 x 4 matrix (.mat:tool=greedy|c3d|niftyreg|mrtrix|flirt), each vertex x goes to T(x), an "
+    "affine one with :invert=yes to where the inverse leads, a mesh (.msh .vtu .vtk .frd "
+    ".inp[:displacement=NAME,step=N|"
+    "deformed=FILE|table=FILE], the first of several), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], "
     "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; "

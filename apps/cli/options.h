@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "backend/backend.h"
-#include "deform/enum_names.h"
 #include "deform/errors.h"
 #include "deform/resampler.h"
+#include "deform/text/enum_names.h"
 #include "io/dicom_series.h"
 #include "io/image_file.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "apps/deform/map_outputs.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/dicom_segmentation.h"
 #include "io/dicom_structures.h"
 

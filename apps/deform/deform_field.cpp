@@ -4,6 +4,7 @@
 #include "apps/deform/deform_field.h"
 
 #include "apps/deform/output_grid.h"
+#include "deform/field_check.h"
 
 namespace tetwarp::apps {
 
@@ -25,14 +26,30 @@ DeformField taken(SimulatedField simulated) {
   return made;
 }
 
+/// Refuses points that would rest beyond the grid of the first of several pull fields, for the others move them.
+/// @throws InputError where the grid does not reach over the output
+void require_all_apply(const PullChoice& choice, const PullField& field, const Geometry& output, Outside outside) {
+  if (outside != Outside::rest || choice.fields.size() == 1) return;
+  try {
+    make_pull_frame(output, view(field, Outside::refuse));
+  } catch (const InputError&) {
+    throw InputError("--outside rest, but " + choice.fields.front().text +
+                     " does not reach over the whole output: beyond its grid points would rest, though the fields "
+                     "behind it move them; choose --outside background, or --grid with the grid of that file");
+  }
+}
+
 DeformField field_of(const DeformRequest& request, const DeformPlan& plan, const DeformInputs& inputs,
                      const Worker& worker, const Control& control) {
   if (const auto* simulated = std::get_if<Simulated>(&request.field))
     return taken(simulate_field(request.options, simulated->scenario, inputs.input->volume.view(), worker, control));
   const int threads = request.options.common.threads;
   const auto& choice = std::get<FieldChoice>(request.field);
-  if (const auto* pull = std::get_if<PullChoice>(&choice))
-    return taken(read_field(*pull, inputs.grid(), plan.grid.value(), threads, control));
+  if (const auto* pull = std::get_if<PullChoice>(&choice)) {
+    ReadPullField read = read_field(*pull, plan.grid.value(), threads, control);
+    require_all_apply(*pull, read.field, *plan.grid, request.options.outside);
+    return taken(std::move(read));
+  }
   return taken(read_field(std::get<ForwardChoice>(choice), inputs.grid(), threads, control));
 }
 

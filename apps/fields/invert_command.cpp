@@ -42,9 +42,53 @@ Invertible read_invertible(const ForwardChoice& choice, const Geometry& like, in
   return {std::move(read.field), std::move(read.origin)};
 }
 
+/// A lattice of one cell over the box of some points and the grid `like`, along the axes of that grid.
+Geometry cell_over(const Geometry& like, const std::vector<glm::dvec3>& points) {
+  const AffineMap index = index_from_point(like);
+  glm::dvec3 low(0), high(like.size - std::int64_t{1});
+  for (const glm::dvec3& point : points) {
+    low = glm::min(low, index(point));
+    high = glm::max(high, index(point));
+  }
+  low -= 1.0;  // what rounding may need
+  high += 1.0;
+  Geometry cell = like;
+  cell.size = glm::i64vec3(2);
+  cell.spacing = like.spacing * (high - low);
+  cell.origin = point_from_index(like)(low);
+  return cell;
+}
+
+/// Affine maps as a field of one cell, which reaches wherever the inverse leads. Where all maps are affine that is
+/// exact, and nothing has to be continued.
+/// @param grid  of the vertices of the inverse
+ReadPullField read_affine(const PullChoice& choice, const Geometry& grid, int threads, const Control& control) {
+  const Geometry first = cell_over(grid, {});
+  const ReadPullField near = read_field(choice, first, threads, control);
+  const auto corner = [&](int i, int j, int k) {
+    const std::size_t vertex = static_cast<std::size_t>(i + 2 * (j + 2 * k));
+    return point_from_index(first)(glm::dvec3(i, j, k)) + glm::dvec3(near.field.displacement[vertex]);
+  };
+  AffineMap map;
+  for (int axis = 0; axis < 3; ++axis) map.linear[axis] = corner(axis == 0, axis == 1, axis == 2) - corner(0, 0, 0);
+  map.offset = corner(0, 0, 0);
+  const AffineMap index_from_image = inverse_of(map);
+  std::vector<glm::dvec3> begin;  // of the points that lead to the corners of the grid
+  for (int n = 0; n < 8; ++n) {
+    const glm::dvec3 at = glm::dvec3(n & 1, n >> 1 & 1, n >> 2 & 1) * glm::dvec3(grid.size - std::int64_t{1});
+    begin.push_back(point_from_index(first)(index_from_image(point_from_index(grid)(at))));
+  }
+  return read_field(choice, cell_over(grid, begin), threads, control);
+}
+
 Invertible read_invertible(const PullChoice& choice, const Geometry& like, int threads, const Control& control) {
   const Geometry grid = straightened(like);  // of the vertices of the inverse, on which a tilted stack is not held
-  ReadPullField read = read_field(choice, like, grid, threads, control);
+  if (is_affine(choice)) {
+    ReadPullField read = read_affine(choice, grid, threads, control);
+    const Geometry cell = read.field.grid;
+    return {VertexField{cell, std::move(read.field.displacement)}, std::move(read.origin), cell, text_of(choice)};
+  }
+  ReadPullField read = read_field(choice, grid, threads, control);
   try {
     return {continued_over(read.field, grid), std::move(read.origin), read.field.grid, text_of(choice)};
   } catch (const InputError& error) {

@@ -11,21 +11,26 @@
 #include "apps/fields/any_field.h"
 #include "apps/fields/field_choice.h"
 #include "io/mesh_file.h"
+#include "io/transform_file.h"
 
 namespace tetwarp::apps {
 
-/// A field file that was read, and what its header says.
+/// What was read of a field that is a file.
 struct ReadFieldFile {
-  std::string path;
-  FieldFileHeader header;
-  std::optional<MeshFileHeader> mesh = {};  ///< of a mesh: then `header` has no grid
+  struct Part {
+    std::string path, sha256;
+  };
+  std::vector<Part> parts;                      ///< the file, then those that it or its options name
+  FieldFileHeader header;                       ///< of a transform nothing but what `transform` says too
+  std::optional<MeshFileHeader> mesh = {};      ///< of a mesh: then `header` has no grid
+  std::optional<TransformFile> transform = {};  ///< of a transform
 };
 
 /// What is said of a field that was read.
 struct FieldOrigin {
   bool identity = false;             ///< nothing moves, by its formula
   std::vector<std::string> notes;    ///< for people: what was assumed
-  std::vector<ReadFieldFile> files;  ///< those that were files of fields, in order
+  std::vector<ReadFieldFile> files;  ///< those that were no formulas, in order
 };
 
 struct ReadForwardField {
@@ -42,17 +47,17 @@ struct ReadPullField {
 /// Formulas need no disk. @throws InputError for unusable files; Cancelled
 ReadForwardField read_field(const ForwardChoice& choice, const Geometry& volume, int threads, const Control& control);
 /// The pull fields of files, composed sample by sample: each point goes through the first, and from there on. The grid
-/// is that of the first file of a field; if the first is a transform, `output`. Arrays without a place lie on `volume`.
-/// @throws InputError for an unusable file; Cancelled
-ReadPullField read_field(const PullChoice& choice, const Geometry& volume, const Geometry& output, int threads,
-                         const Control& control);
+/// is that of the first file of a field, and `output` if the first is a transform or an array without a place.
+/// @throws InputError for an unusable file, or an array without a place that is not the first; Cancelled
+ReadPullField read_field(const PullChoice& choice, const Geometry& output, int threads, const Control& control);
 
-/// The displacement field or transform of a registration, in either direction: it leads from the points of `grid` to
-/// those of the volume with the grid `volume`. A field file that states a direction has to state this one.
-/// @param forward  whether that is the direction from the moving to the fixed volume, the forward one
-/// @throws InputError for an unusable file; Cancelled
-ReadPullField read_point_map(const PullChoice& choice, const Geometry& volume, const Geometry& grid, bool forward,
-                             int threads, const Control& control);
+/// The same for fields and transforms that lead the other way, from the points of the moving volume to the fixed one:
+/// those of a registration in its forward direction. Which of its two volumes a transform begins in, its user knows.
+/// @throws InputError also for a field that states that it leads back
+ReadPullField read_forward_map(const PullChoice& choice, const Geometry& moving, int threads, const Control& control);
+
+/// Whether all its fields are affine transforms. @throws InputError for an unusable one; Cancelled
+bool is_affine(const PullChoice& choice);
 
 /// Memory of the field that `read_field` will give, with what a mesh needs for its own work. Transforms and meshes are
 /// read, so that a bad one is known early.

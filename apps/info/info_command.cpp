@@ -69,6 +69,7 @@ json describe_transform(const FieldSource& source) {
           {"tool", transform.tool},
           {"classes", transform.classes},
           {"parameters", transform.parameters},
+          {"inverted", transform.inverted},
           {"direction", !known  ? "as the option says: -f or --pull-field"
                         : pulls ? "output to input (pull)"
                                 : "input to output (forward)"},
@@ -151,7 +152,8 @@ void print_mesh(const json& document) {
               text(document["units"]).c_str(), text(known["units"]).c_str());
   std::printf("  vectors      %s\n", arrays.empty() ? "none at the vertices" : arrays.c_str());
   if (document["displacement"].is_null()) {
-    std::printf("  displacement undecided; give displacement=NAME, step=N or deformed=FILE behind the name\n");
+    std::printf(
+        "  displacement undecided; give displacement=NAME, step=N, deformed=FILE or table=FILE behind the name\n");
   } else {
     std::printf("  displacement %s, at most %.6g mm\n", document["displacement"].dump().c_str(),
                 document["largest_displacement_mm"].get<double>());
@@ -166,6 +168,7 @@ void print_file(const json& document) {
   } else if (document["kind"] == "transform") {
     std::printf("  written by   %s\n", document["tool"].get<std::string>().c_str());
     for (const json& name : document["classes"]) std::printf("  class        %s\n", name.get<std::string>().c_str());
+    if (document["inverted"].get<bool>()) std::printf("  inverted     yes (invert=yes)\n");
     std::printf("  parameters   %s\n", document["parameters"].dump().c_str());
     std::printf("  direction    %s\n", document["direction"].get<std::string>().c_str());
     std::printf("  points       positions (absolute), frame %s, %s\n", document["frame"].get<std::string>().c_str(),
@@ -197,7 +200,12 @@ Described look_at(const InfoOptions& options) {
   if (has_image_suffix(path)) return describe_image(path, options.common.nifti_frame);
   if (is_dicom_dose(path)) return describe_dose(path);
   Stage stage(options.common, "scan");
-  return scan_dicom(path, options.input.single, stage.control());
+  DicomScan scan = scan_dicom(path, options.input.single, stage.control());
+  for (const LeftOutFile& file : scan.skipped) {
+    require(file.file != path || !file.reason.starts_with("not DICOM"),
+            [&] { return "of no format that is known, " + path.string() + " (" + file.reason + ")"; });
+  }
+  return scan;
 }
 
 json document_of(const DicomScan& scan, const InfoOptions& options) { return describe(scan, options.input); }

@@ -167,7 +167,7 @@ void RenderScene::read_field(const Control& control) {
     add_notes(read.origin.notes);
   };
   if (const auto* pull = std::get_if<PullChoice>(&*fields_.deforming))
-    take(apps::read_field(*pull, source, grid_, options_.common.threads, control));
+    take(apps::read_field(*pull, grid_, options_.common.threads, control));
   else
     take(apps::read_field(std::get<ForwardChoice>(*fields_.deforming), source, options_.common.threads, control));
 }

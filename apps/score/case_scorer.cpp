@@ -22,9 +22,9 @@ namespace fs = std::filesystem;
 using score::Counts;
 
 /// Suffixes of results: those of fields, transforms and points.
-constexpr const char* kSuffixes[] = {".mha",  ".mhd", ".nrrd", ".nhdr", ".nii",  ".nii.gz",  ".h5",
-                                     ".hdf5", ".tfm", ".txt",  ".toml", ".mat",  ".npy",     ".vts",
-                                     ".vti",  ".vtk", ".dcm",  ".csv",  ".fcsv", ".mrk.json"};
+constexpr const char* kSuffixes[] = {".mha", ".mhd",  ".nrrd", ".nhdr", ".nii", ".nii.gz", ".h5",      ".hdf5", ".tfm",
+                                     ".txt", ".toml", ".mat",  ".lta",  ".mgz", ".mgh",    ".npy",     ".npz",  ".vts",
+                                     ".vti", ".vtr",  ".vtk",  ".dcm",  ".csv", ".fcsv",   ".mrk.json"};
 
 /// The file in a folder whose name is `name` and a suffix; empty: there is none. @throws InputError for several
 fs::path result_in(const fs::path& folder, const std::string& name) {
@@ -135,13 +135,14 @@ PullField CaseScorer::sampled(PullField field, const Geometry& grid, const Contr
 }
 
 /// A result as its file has it: on a grid of its own, or of a transform sampled at every voxel of `grid`.
-/// @param source   grid of the volume to which the result leads
 /// @param grid     that of the volume from which it leads
 /// @param forward  whether it leads from the moving volume to a fixed one
-PullField CaseScorer::read_result(const fs::path& file, const Geometry& source, const Geometry& grid, bool forward,
+PullField CaseScorer::read_result(const fs::path& file, const Geometry& grid, bool forward,
                                   std::vector<std::string>& notes, const Control& control) const {
-  ReadPullField read = read_point_map(parse_pull_fields({file.string()}, options_.common.nifti_frame), source, grid,
-                                      forward, options_.common.threads, control);
+  const PullChoice choice = parse_pull_fields({file.string()}, options_.common.nifti_frame);
+  const int threads = options_.common.threads;
+  ReadPullField read =
+      forward ? read_forward_map(choice, grid, threads, control) : read_field(choice, grid, threads, control);
   notes.insert(notes.end(), read.origin.notes.begin(), read.origin.notes.end());
   return std::move(read.field);
 }
@@ -211,7 +212,7 @@ void CaseScorer::score_back(const fs::path& back, const TruthCase& one, const Si
   if (back.empty()) return;
   const fs::path file = result_of(back, set_, one);
   require(!file.empty(), "there is no result of " + one.name + " in " + back.string());
-  const PullField onto = read_result(file, side.grid(), side.other, !options_.forward, score.notes, control);
+  const PullField onto = read_result(file, side.other, !options_.forward, score.notes, control);
   score.inverse_consistency = score::consistency(result, onto, nullptr, side.counts, limits(), {.stop = control.stop});
 }
 
@@ -224,9 +225,9 @@ void CaseScorer::score_triples(const fs::path& results, const TruthCase& one, co
     const fs::path onwards = result_of(results, set_, other);
     require(!onwards.empty(), between.string() + " leads to " + other.name + ", of which there is no result");
     const Geometry fixed = read_image_header(other.fixed).geometry;
-    const PullField first = sampled(read_result(between, fixed, side.grid(), false, score.notes, control), side.grid(),
-                                    control),
-                    second = read_result(onwards, side.other, fixed, false, score.notes, control);
+    const PullField first =
+                        sampled(read_result(between, side.grid(), false, score.notes, control), side.grid(), control),
+                    second = read_result(onwards, fixed, false, score.notes, control);
     score.transitivity[other.name] =
         score::consistency(first, second, &result, side.counts, limits(), {.stop = control.stop});
   }
@@ -240,7 +241,7 @@ void CaseScorer::score_field(const fs::path& results, const fs::path& back, cons
   const Geometry& grid = side.grid();
   const Geometry &moving = moving_.ct->geometry(), &fixed = options_.forward ? side.other : grid;
   const PullField result =
-      sampled(read_result(score.file, side.other, grid, options_.forward, score.notes, control), grid, control);
+      sampled(read_result(score.file, grid, options_.forward, score.notes, control), grid, control);
 
   const ForwardChoice choice = parse_forward_fields({one.field.string()}, {}, options_.common.nifti_frame);
   const VertexField field = read_field(choice, moving, options_.common.threads, control).field;

@@ -39,7 +39,7 @@ class CaseScorer {
   static Volumes read_volumes(const std::filesystem::path& ct, const std::filesystem::path& labels);
 
   Side side_of(const TruthCase& one) const;
-  PullField read_result(const std::filesystem::path& file, const Geometry& source, const Geometry& grid, bool forward,
+  PullField read_result(const std::filesystem::path& file, const Geometry& grid, bool forward,
                         std::vector<std::string>& notes, const Control& control) const;
   /// A result at every voxel of a grid.
   PullField sampled(PullField field, const Geometry& grid, const Control& control) const;

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "apps/batch/manifest_rows.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/lower_case.h"
 
 namespace tetwarp::apps {

@@ -31,7 +31,7 @@ viewer::Reel read_reel(const ViewFields& fields, const Geometry& volume, const G
   }
   auto whole = std::make_shared<AnyField>();
   if (const auto* pull = std::get_if<PullChoice>(&*fields.growing))
-    *whole = apps::read_field(*pull, volume, grid, threads, control).field;
+    *whole = apps::read_field(*pull, grid, threads, control).field;
   else
     *whole = apps::read_field(std::get<ForwardChoice>(*fields.growing), volume, threads, control).field;
   reel.frames = kGrowthFrames;

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "deform/phantom.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/dicom_series.h"
 #include "io/image_file.h"
 

@@ -12,7 +12,7 @@
 #include "deform/fields/elastic.h"
 #include "deform/fields/formula.h"
 #include "deform/fields/parameter_text.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 
 namespace tetwarp {
 

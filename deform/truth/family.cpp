@@ -11,7 +11,7 @@
 #include "deform/errors.h"
 #include "deform/field_quality.h"
 #include "deform/fields/parameter_text.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "deform/truth/motions.h"
 #include "deform/truth/slip_tube.h"
 
@@ -89,10 +89,10 @@ double number_of(std::string_view text, std::string_view of, const Parameter& pa
   const auto value = number_from<double>(text);
   const bool fits = value && *value >= parameter.least && *value <= parameter.most &&
                     (!parameter.is_whole || *value == std::floor(*value));
-  require(fits,
-          "case " + std::string(of) + ": " + std::string(parameter.name) + " is \"" + std::string(text) +
-              "\"; expected a " + (parameter.is_whole ? "whole " : "") + "number from " + short_text(parameter.least) +
-              " to " + short_text(parameter.most) + ", " + std::string(parameter.about));
+  require(fits, "case " + std::string(of) + ": " + std::string(parameter.name) + " is \"" + std::string(text) +
+                    "\"; expected a " + (parameter.is_whole ? "whole " : "") + "number from " +
+                    short_text(parameter.least) + " to " + short_text(parameter.most) + ", " +
+                    std::string(parameter.about));
   return *value;
 }
 

@@ -38,8 +38,8 @@ const FieldFormat& required_format(const std::filesystem::path& path) {
   const FieldFormat* format = format_of(path);
   require(format != nullptr || is_there(path), "no such file, " + path.string());
   require(format != nullptr, "not a field file, " + path.string() +
-                                 "; expected .mha .nrrd .nii .nii.gz .npy .vts .vti .vtr .vtk, or a "
-                                 "DICOM Deformable Spatial Registration");
+                                 "; expected .mha .nrrd .nii .nii.gz .mgz .npy .npz .vts .vti .vtr .vtk, or "
+                                 "a DICOM Deformable Spatial Registration");
   return *format;
 }
 
@@ -125,6 +125,8 @@ FieldSource parse_field_source(const std::string& text) {
 void check_field_options(const FieldSource& source) {
   const FieldFormat* format = format_of(source.path);
   if (format == nullptr) return;  // a file of no known format is refused when it is read
+  require(!source.options.contains("invert"), "invert= is for affine transforms, " + source.path.string() +
+                                                  " is a field; tetwarp invert writes the inverse of one");
   if (format->check_options) return format->check_options(source);
   require(source.options.empty(), "the option \"" + (source.options.empty() ? "" : source.options.begin()->first) +
                                       "\" for " + source.path.string() + "; files of its format take none");

@@ -25,7 +25,7 @@ extern const FieldFormat kFieldFormat_image;
 
 /// Opens a volume file. @throws InputError unless it has three floats or doubles a voxel
 std::unique_ptr<ImageReader> open_vectors(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform,
-                                          NiftiVectors vectors = NiftiVectors::fifth);
+                                          NiftiVectors vectors = NiftiVectors::stated);
 
 /// Takes the direction of the field (forward or pull) from the key `kDirectionKey`, where the file has it, and frame
 /// and units with it: Tetwarp writes the key only to displacements in LPS mm. Else the direction alone is taken from

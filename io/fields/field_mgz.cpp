@@ -23,15 +23,14 @@
 namespace tetwarp {
 namespace {
 
-constexpr std::uint64_t kDataOffset = 284,
-                        kScanBytes = 20;  // of the voxels; of what stands behind them before the tags
-constexpr int kFloat = 3;                 // MRI_FLOAT
+constexpr std::uint64_t kDataOffset = 284, kHeaderBytes = 90,  // of the voxels; of what is read of the header
+    kScanBytes = 20;                                           // of what stands behind the voxels, before the tags
+constexpr int kFloat = 3;                                      // MRI_FLOAT
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 
 // Tags of FreeSurfer (mri.h, tags.h). Some have no length.
 constexpr std::int32_t kTagColours = 1, kTagSurfaceRas = 2, kTagGeometries = 10, kTagMorphType = 11, kTagLabels = 12,
                        kTagMeta = 13, kTagSheared = 15, kTagSurfaceGeometry = 20, kTagOldTransform = 30;
-constexpr std::size_t kGeometryBytes = 588;  // of one volume of kTagGeometries
 
 /// The bytes of a file, inflated where they are gzip data. Numbers are big-endian.
 class Bytes {
@@ -77,12 +76,13 @@ class Bytes {
     return v;
   }
 
-  void seek(std::uint64_t offset) {
-    require(gzseek(file_.get(), static_cast<z_off_t>(offset), SEEK_SET) >= 0, "truncated, " + name_);
-  }
+  /// Goes on so many bytes. The last of them is read, for gzseek goes beyond the end without a word.
   void skip(std::uint64_t count) {
-    require(count < (std::uint64_t{1} << 40) && gzseek(file_.get(), static_cast<z_off_t>(count), SEEK_CUR) >= 0,
-            "truncated or damaged behind the vectors, " + name_);
+    if (count == 0) return;
+    std::array<char, 1> last{};
+    require(count < (std::uint64_t{1} << 40) && gzseek(file_.get(), static_cast<z_off_t>(count - 1), SEEK_CUR) >= 0,
+            "truncated or damaged, " + name_);
+    read(last);
   }
 
  private:
@@ -127,11 +127,23 @@ std::optional<Geometry> read_geometry(Bytes& bytes, bool sheared, const std::str
   const glm::dvec3 spacing = bytes.vector();
   const glm::dmat3 cosines = read_cosines(bytes);
   const glm::dvec3 centre = bytes.vector(), shear = sheared ? bytes.vector() : glm::dvec3(0);
-  const bool straight = glm::all(glm::lessThanEqual(glm::abs(shear), glm::dvec3(1e-4)));  // beyond rounding
-  require(straight, "a sheared volume, " + file + "; resample it onto an orthogonal grid");
   bytes.skip(kNameBytes);
   if (!valid) return std::nullopt;
+  const bool straight = glm::all(glm::lessThanEqual(glm::abs(shear), glm::dvec3(1e-4)));  // beyond rounding
+  require(straight, "a sheared volume, " + file + "; resample it onto an orthogonal grid");
   return geometry_of(size, spacing, cosines, centre);
+}
+
+/// Reads the geometries of the source and of the target. The target's is the volume's own.
+/// @throws InputError where the target has another size: such a warp has a vertex only every few voxels, and its header
+/// does not say where
+void read_geometries(Bytes& bytes, bool sheared, const std::string& file, Warp& warp) {
+  warp.source = read_geometry(bytes, sheared, file);
+  const std::optional<Geometry> target = read_geometry(bytes, sheared, file);
+  require(!target || target->size == warp.grid.size, [&] {
+    return "a warp of " + to_string(warp.grid.size) + " vertices for a target volume of " + to_string(target->size) +
+           " voxels, " + file + "; expected one a voxel, as mri_warp_convert writes for a warp of spacing 1";
+  });
 }
 
 void read_tags(Bytes& bytes, const std::string& file, Warp& warp) {
@@ -139,24 +151,24 @@ void read_tags(Bytes& bytes, const std::string& file, Warp& warp) {
   while (bytes.try_read(raw)) {
     const auto tag = Bytes::from_big_endian<std::int32_t>(raw);
     if (tag == 0) return;
-    if (tag == kTagGeometries) {
-      warp.source = read_geometry(bytes, false, file);
-      bytes.skip(kGeometryBytes);  // that of the target is the volume's own
+    if (tag == kTagGeometries || tag == kTagMorphType || tag == kTagLabels) {  // which have no length
+      if (tag == kTagGeometries) read_geometries(bytes, false, file, warp);
+      if (tag == kTagMorphType) bytes.number<std::int32_t>();
+      if (tag == kTagLabels) bytes.skip(sizeof(std::int32_t) * static_cast<std::uint64_t>(voxel_count(warp.grid)));
       continue;
     }
     require(
-        tag != kTagColours && tag != kTagSurfaceRas && tag != kTagMorphType && tag != kTagLabels &&
-            tag != kTagSurfaceGeometry,
+        tag != kTagColours && tag != kTagSurfaceRas && tag != kTagSurfaceGeometry,
         "a tag " + std::to_string(tag) + " behind the vectors, " + file + "; expected a warp of FreeSurfer 7 or later");
     const auto length =
         tag == kTagOldTransform ? std::int64_t{bytes.number<std::int32_t>()} : bytes.number<std::int64_t>();
     require(length >= 0, "a tag of " + std::to_string(length) + " bytes, " + file);
     if (tag == kTagMeta) {
+      require(length >= 4, "a tag 13 of " + std::to_string(length) + " bytes, " + file + "; expected at least 4");
       warp.form = bytes.number<std::int32_t>();
-      bytes.skip(static_cast<std::uint64_t>(std::max<std::int64_t>(length - 4, 0)));
+      bytes.skip(static_cast<std::uint64_t>(length) - 4);
     } else if (tag == kTagSheared) {
-      warp.source = read_geometry(bytes, true, file);
-      read_geometry(bytes, true, file);
+      read_geometries(bytes, true, file, warp);
     } else {
       bytes.skip(static_cast<std::uint64_t>(length));
     }
@@ -195,7 +207,7 @@ Warp read_warp(const std::filesystem::path& path) {
   require_valid(warp.grid, file);
   const double held = 1040.0 * static_cast<double>(std::filesystem::file_size(path));  // deflate makes 1032 of one
   require(static_cast<double>(vector_bytes(warp.grid)) <= held, "a header that promises too much, " + file);
-  bytes.seek(kDataOffset + vector_bytes(warp.grid) + kScanBytes);
+  bytes.skip(kDataOffset - kHeaderBytes + vector_bytes(warp.grid) + kScanBytes);
   read_tags(bytes, file, warp);
   require(warp.form.has_value(), "the form of the vectors is not stated (tag 13), " + file +
                                      "; expected a warp of FreeSurfer 7 or later, such as mri_synthmorph writes");
@@ -215,7 +227,7 @@ class MgzReader final : public FieldReader {
 
   void read(std::span<glm::vec3> displacement) const override {
     Bytes bytes(path_);
-    bytes.seek(kDataOffset);
+    bytes.skip(kDataOffset);
     std::vector<char> plane(sizeof(float) * static_cast<std::size_t>(header_.grid.size.x * header_.grid.size.y));
     for (int component = 0; component < 3; ++component) {
       std::size_t vertex = 0;

@@ -15,7 +15,7 @@
 namespace tetwarp {
 namespace {
 
-constexpr int kDisplacementVector = 1006, kFslField = 2006;
+constexpr int kDisplacementVector = 1006, kVector = 1007, kFslField = 2006;
 constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 
 /// What is refused, by the type of a NiftyReg file (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, which intent_p1 holds):
@@ -56,15 +56,35 @@ void describe_spm(FieldFileHeader& header) {
   header.direction_basis = header.frame_basis = header.units_basis = header.absolute_basis = FieldBasis::by_format;
 }
 
+/// Whether the file's intent states that it has vectors.
+bool states_vectors(const NiftiHeader& nifti) {
+  return nifti.intent_code == kDisplacementVector || nifti.intent_code == kVector;
+}
+
+/// Refuses vectors of which neither the file nor the options say what they are.
+/// @throws InputError with the options to give
+void require_declared(const NiftiHeader& nifti, const FieldSource& source) {
+  const std::string file = source.path.string();
+  const bool values = source.options.contains("values");
+  if (is_fsl_intent(nifti.intent_code)) {
+    require(values && source.options.contains("source"),
+            "a field of FSL leads into its moving image, and does not say whether it holds displacements (relative) or "
+            "positions (absolute), " +
+                file + "; give both: " + file + ":values=displacements|positions,source=MOVING");
+    return;
+  }
+  const bool as_volumes = nifti.dim[0] == 4 && nifti.dim[4] == 3;
+  const bool unstated = nifti.dim[0] >= 5 && nifti.dim[4] == 1 && nifti.dim[5] == 3 && !states_vectors(nifti);
+  require((!as_volumes && !unstated) || (values && source.options.contains("frame")),
+          "vectors that the file does not state to be some, " + file + "; give " + file +
+              ":values=displacements|positions,frame=lps|ras");
+}
+
 /// A field of FSL, from the coordinates of its own grid to those of the source image, in either form.
 void describe_fsl(const NiftiHeader& nifti, const FieldSource& source, FieldFileHeader& header) {
   const std::string file = source.path.string();
   require(nifti.intent_code == kFslField, "coefficients of fnirt (intent code " + std::to_string(nifti.intent_code) +
                                               "), " + file + "; make a field of them with fnirtfileutils --out");
-  require(source.options.contains("source") && source.options.contains("values"),
-          "a field of FSL leads into its moving image, and does not say whether it holds displacements (relative) or "
-          "positions (absolute), " +
-              file + "; give both: " + file + ":values=displacements|positions,source=MOVING");
   header.format = "NIfTI, FSL field (intent 2006)";
   header.direction = Direction::pull;
   header.frame = "FSL";
@@ -146,11 +166,11 @@ NiftiFrame frame_of(const FieldSource& source, const NiftiHeader& nifti) {
 /// A file whose vectors are volumes is taken for a field only where something says that it is one: three volumes may be
 /// three times as well.
 NiftiVectors vectors_of(const FieldSource& source) {
-  return source.options.empty() ? NiftiVectors::fifth : NiftiVectors::fourth_too;
+  return source.options.empty() ? NiftiVectors::stated : NiftiVectors::declared;
 }
 
 bool holds_field(const FieldSource& source) {
-  const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::fourth_too);
+  const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::declared);
   if (is_fsl_intent(nifti.intent_code)) return true;
   const ImageHeader header = open_image(source.path, frame_of(source, nifti), vectors_of(source))->header();
   return header.components == 3 && !is_niftyreg_spline(nifti);
@@ -166,17 +186,25 @@ void check_options(const FieldSource& source) {
             "values=" + value + ", " + file + "; expected displacements or positions");
     require(!frame || value == "lps" || value == "ras", "frame=" + value + ", " + file + "; expected lps or ras");
   }
+  NiftiHeader nifti;
+  try {
+    nifti = read_nifti_header(source.path, NiftiVectors::declared);
+  } catch (const InputError&) {
+    return;  // whoever reads the file says what is wrong with it
+  }
+  require_declared(nifti, source);
 }
 
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   const std::string file = source.path.string();
-  const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::fourth_too);
+  const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::declared);
   const bool fsl = is_fsl_intent(nifti.intent_code);
   require(fsl || !source.options.contains("source"), "source=, " + file + ": only the fields of FSL need that image");
+  require_declared(nifti, source);
   FieldFileHeader header;
   header.format = "NIfTI, intent 1007 (VECTOR)";
   if (fsl) describe_fsl(nifti, source, header);
-  auto image = open_vectors(source.path, frame_of(source, nifti), fsl ? NiftiVectors::fourth_too : vectors_of(source));
+  auto image = open_vectors(source.path, frame_of(source, nifti), fsl ? NiftiVectors::declared : vectors_of(source));
   header.notes = image->header().notes;
   header.grid = image->header().geometry;
   if (nifti.intent_name.starts_with("NREG_")) {
@@ -187,10 +215,8 @@ std::unique_ptr<FieldReader> open(const FieldSource& source) {
     read_stated_direction(image->header(), file, header);
     if (nifti.intent_code == kDisplacementVector) describe_displacement_vectors(nifti, header);
     if (nifti.dim[0] == 4) header.format = "NIfTI, vectors as volumes";
+    if (nifti.dim[0] > 4 && !states_vectors(nifti)) header.format = "NIfTI, vectors without an intent";
   }
-  require(
-      nifti.dim[0] != 4 || source.options.contains("values"),
-      "vectors as volumes, " + file + ", do not say what they are; give " + file + ":values=displacements|positions");
   take_options(source, header);
   std::optional<Geometry> fsl_source;
   if (fsl) fsl_source = read_image_header(source.option("source"), source.nifti_frame).geometry;

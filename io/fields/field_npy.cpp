@@ -7,12 +7,13 @@
 
 #include "io/fields/numpy_array.h"
 #include "io/images/image_reader.h"
+#include "io/lower_case.h"
 
 namespace tetwarp {
 namespace {
 
 bool recognizes(const std::filesystem::path& path, std::string_view first_bytes) {
-  return path.extension() == ".npy" || first_bytes.starts_with("\x93NUMPY");
+  return lower(path.extension().string()) == ".npy" || first_bytes.starts_with("\x93NUMPY");
 }
 
 void check_options(const FieldSource& source) { check_numpy_options(source); }

@@ -168,7 +168,7 @@ class NumpyReader final : public FieldReader {
     for (std::size_t a = 0; a < extent[0]; ++a) {
       for (std::size_t b = 0; b < extent[1]; ++b) {
         stream.read(reinterpret_cast<char*>(plane.data()), static_cast<std::streamsize>(plane.size() * sizeof(Bits)));
-        require(stream.good(), "truncated values, " + path_.string() + "; is the file whole?");
+        require(stream.good(), "truncated or damaged values, " + path_.string() + "; is the file whole?");
         std::size_t n = 0;
         for (std::size_t c = 0; c < extent[2]; ++c) {
           for (std::size_t d = 0; d < extent[3]; ++d, ++n) {

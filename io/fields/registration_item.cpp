@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
@@ -33,8 +33,7 @@ std::size_t registration_item(const FieldSource& source) {
   if (found == source.options.end()) return 0;
   const std::string& text = found->second;
   const std::size_t number = number_from<std::size_t>(text).value_or(0);
-  require(number >= 1,
-          "item=" + text + ", " + source.path.string() + "; expected a whole number from 1");
+  require(number >= 1, "item=" + text + ", " + source.path.string() + "; expected a whole number from 1");
   return number;
 }
 

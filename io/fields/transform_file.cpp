@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "deform/errors.h"
@@ -48,7 +49,7 @@ void check_options(const TransformFormat& format, const FieldSource& source) {
   if (format.check_options) return format.check_options(others);
   require(others.options.empty(), [&] {
     return "the option \"" + others.options.begin()->first + "\", " + source.path.string() +
-           "; expected invert, or none";
+           "; this format takes invert alone";
   });
 }
 
@@ -65,17 +66,25 @@ AffineMap map_of(const TransformFile& transform) {
   return map;
 }
 
-/// @throws InputError for a transform that is not affine, or has no inverse
+/// @throws InputError for a map with numbers that are not finite, or without an inverse to speak of
+void require_invertible(const AffineMap& map, const std::string& file) {
+  constexpr double kFlat = 1e-9;  // of the volume that the three columns would span at right angles
+  double largest = 1;
+  for (int axis = 0; axis < 3; ++axis) largest *= glm::length(map.linear[axis]);
+  const double volume = std::abs(glm::determinant(map.linear));
+  require(std::isfinite(volume) && std::isfinite(glm::length(map.offset)) && volume > kFlat * largest,
+          "a matrix without an inverse (determinant " + std::to_string(volume) + "), " + file +
+              "; a transform maps different points to different ones");
+}
+
+/// @throws InputError for a transform that is not affine
 void invert(TransformFile& transform, const std::string& file) {
   require(transform.affine, "invert=yes, " + file +
                                 ": of the transforms only affine ones can be inverted; give the inverse that the tool "
                                 "writes, or use tetwarp invert");
-  const AffineMap map = map_of(transform);
-  require(std::abs(glm::determinant(map.linear)) > 1e-9, "invert=yes, " + file + ": the matrix has no inverse");
-  transform.displacement = affine_transform(inverse_of(map)).displacement;
-  transform.classes.insert(transform.classes.begin(), "inverse of");
-  // Whoever inverts a transform knows in which of its two volumes points begin.
-  transform.direction.reset();
+  transform.displacement = affine_transform(inverse_of(map_of(transform))).displacement;
+  transform.inverted = true;
+  transform.direction.reset();  // whoever inverts a transform knows in which of its two volumes points begin
 }
 
 }  // namespace
@@ -111,6 +120,7 @@ TransformFile read_transform_file(const FieldSource& source, const std::stop_tok
   const TransformFormat& format = format_of(source);
   if (is_file(source.path)) check_options(format, source);
   TransformFile transform = format.read(source, stop);
+  if (transform.affine) require_invertible(map_of(transform), source.path.string());
   if (source.option("invert") == "yes") invert(transform, source.path.string());
   return transform;
 }

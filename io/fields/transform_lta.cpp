@@ -8,10 +8,11 @@
 #include <cmath>
 #include <fstream>
 #include <glm/matrix.hpp>
+#include <optional>
 #include <sstream>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/fields/transform_matrix.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
@@ -52,8 +53,7 @@ class Lines {
     std::vector<double> numbers;
     for (const std::string& word : words(text)) {
       const auto value = number_from<double>(word);
-      require(value && std::isfinite(*value),
-              "\"" + word.substr(0, 40) + "\"" + here() + "; expected a finite number");
+      require(value && std::isfinite(*value), "\"" + word.substr(0, 40) + "\"" + here() + "; expected a finite number");
       numbers.push_back(*value);
     }
     require(numbers.size() == count,
@@ -82,9 +82,10 @@ class Lines {
 };
 
 /// The map from voxel index to RAS mm of a volume, whose centre is at index size / 2.
-AffineMap read_volume(Lines& lines, const std::string& which) {
+/// @return none where the file says that the place is not valid
+std::optional<AffineMap> read_volume(Lines& lines, const std::string& which) {
   lines.expect(which + " volume info");
-  require(lines.values("valid", 1)[0] == 1, "the place of the " + which + " volume is not valid" + lines.here());
+  const bool valid = lines.values("valid", 1)[0] == 1;
   lines.next();  // file name
   const std::vector<double> size = lines.values("volume", 3), spacing = lines.values("voxelsize", 3);
   AffineMap map;
@@ -97,6 +98,7 @@ AffineMap read_volume(Lines& lines, const std::string& which) {
     else
       map.linear[column] = glm::dvec3(v[0], v[1], v[2]) * spacing[static_cast<std::size_t>(column)];
   }
+  if (!valid) return std::nullopt;
   require(std::abs(glm::determinant(map.linear)) > 1e-12,
           "the axes of the " + which + " volume have no inverse" + lines.here());
   map.offset = centre - map.linear * (glm::dvec3(size[0], size[1], size[2]) / 2.0);
@@ -124,12 +126,13 @@ TransformFile read(const FieldSource& source, const std::stop_token&) {
     const std::vector<double> values = lines.numbers(lines.next(), 4);
     std::copy(values.begin(), values.end(), matrix.begin() + static_cast<std::ptrdiff_t>(4 * row));
   }
-  const AffineMap from = read_volume(lines, "src"), to = read_volume(lines, "dst");
+  const std::optional<AffineMap> from = read_volume(lines, "src"), to = read_volume(lines, "dst");
   AffineMap map = lps_map_of_ras(matrix, file);
   if (type == kVoxels) {
+    require(from && to, "a matrix between voxels, but the place of a volume is not valid, " + file);
     // The matrix was taken for one between RAS and turned to LPS; the same turn takes the volumes' maps along.
     const AffineMap turn{glm::dmat3(-1, 0, 0, 0, -1, 0, 0, 0, 1), glm::dvec3(0)};
-    map = turn * to * turn * map * turn * inverse_of(from) * turn;
+    map = turn * *to * turn * map * turn * inverse_of(*from) * turn;
   }
   TransformFile result = affine_transform(map);
   result.tool = "FreeSurfer";

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/fields/fsl_frame.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
@@ -30,9 +30,8 @@ std::vector<double> read_numbers(const std::filesystem::path& path) {
          at = line.find_first_not_of(kBlank, at)) {
       const std::size_t end = std::min(line.find_first_of(kBlank, at), line.size());
       const auto value = number_from<double>(std::string_view(line).substr(at, end - at));
-      require(value && numbers.size() < kMost,
-              "\"" + line.substr(at, std::min<std::size_t>(end - at, 40)) + "\" in " + path.string() +
-                  "; expected the 16 numbers of a 4 x 4 matrix");
+      require(value && numbers.size() < kMost, "\"" + line.substr(at, std::min<std::size_t>(end - at, 40)) + "\" in " +
+                                                   path.string() + "; expected the 16 numbers of a 4 x 4 matrix");
       numbers.push_back(*value);
       at = end;
     }

@@ -20,9 +20,10 @@ enum class ImageFormat : std::uint8_t { nifti, nrrd, mha };
 /// The format that a suffix names, in upper or lower case.
 std::optional<ImageFormat> image_format(const std::filesystem::path& path);
 
-/// On which axis of a NIfTI file the components of a voxel may be. The standard has them on the fifth; MRtrix and FSL
-/// write the vectors of a field as volumes on the fourth, the axis of time.
-enum class NiftiVectors : std::uint8_t { fifth, fourth_too };
+/// How it is known that a NIfTI file has vectors: its intent code states it (1006 or 1007, on the fifth axis), or the
+/// caller declares it. Then three values are vectors on the fifth axis whatever the intent, and on the fourth, that of
+/// time, as MRtrix and FSL write them.
+enum class NiftiVectors : std::uint8_t { stated, declared };
 
 /// How the voxels lie in the file.
 struct StoredVoxels {
@@ -57,6 +58,6 @@ void require_readable_file(const std::filesystem::path& path);
 /// Reads and checks the header; a header that promises more than the file can hold is refused here, before anything is
 /// allocated. @throws InputError as `read_image_header`
 std::unique_ptr<ImageReader> open_image(const std::filesystem::path& path, NiftiFrame frame = NiftiFrame::sform,
-                                        NiftiVectors vectors = NiftiVectors::fifth);
+                                        NiftiVectors vectors = NiftiVectors::stated);
 
 }  // namespace tetwarp

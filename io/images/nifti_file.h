@@ -34,7 +34,7 @@ struct NiftiHeader {
 /// @throws InputError naming the file: no NIfTI-1 in one file, more than one time point, a vector that is neither of
 ///         intent 1006 nor 1007, a datatype that VoxelType does not have, units other than mm, no orientation, a form
 ///         that is not finite
-NiftiHeader read_nifti_header(const std::filesystem::path& path, NiftiVectors vectors = NiftiVectors::fifth);
+NiftiHeader read_nifti_header(const std::filesystem::path& path, NiftiVectors vectors = NiftiVectors::stated);
 
 /// Whether an intent is one of FSL's: a field of displacements, or coefficients of cubic, cosine or quadratic
 /// functions.
@@ -49,6 +49,6 @@ const Geometry& place_of(const NiftiHeader& header, NiftiFrame frame, const std:
 int nifti_datatype(VoxelType type);
 
 std::unique_ptr<ImageReader> open_nifti(const std::filesystem::path& path, NiftiFrame frame,
-                                        NiftiVectors vectors = NiftiVectors::fifth);
+                                        NiftiVectors vectors = NiftiVectors::stated);
 
 }  // namespace tetwarp

@@ -116,18 +116,18 @@ int require_one_volume(const NiftiHeader& header, NiftiVectors vectors, const st
             "a size of " + dims + ", " + file + "; expected at least 1 on every axis");
   }
   const auto beyond = [&](std::size_t i) { return static_cast<std::int64_t>(i) <= dim[0] ? dim[i] : 1; };
-  const bool on_fourth = vectors == NiftiVectors::fourth_too && beyond(4) == 3 && beyond(5) == 1;
+  const bool on_fourth = vectors == NiftiVectors::declared && beyond(4) == 3 && beyond(5) == 1;
   require(on_fourth || !is_fsl_intent(header.intent_code), "a field or coefficients of FSL (intent code " +
                                                                std::to_string(header.intent_code) + "), " + file +
                                                                ", is no volume of one value a voxel");
-  require(on_fourth || beyond(4) == 1,
-          std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
-              "; split the file, one volume is expected" +
-              (beyond(4) == 3 ? ", or say that they are vectors: " + file + ":values=displacements|positions" : ""));
-  const bool vector = beyond(5) > 1, may_be_vector = header.intent_code == 1006 || header.intent_code == 1007;
-  require(!vector || may_be_vector, std::to_string(beyond(5)) + " values a voxel with intent code " +
-                                        std::to_string(header.intent_code) + ", " + file +
-                                        "; expected 1 value, or vectors with intent code 1006 or 1007");
+  const std::string say = ", or say that they are vectors: " + file + ":values=displacements|positions,frame=lps|ras";
+  require(on_fourth || beyond(4) == 1, std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
+                                           "; split the file, one volume is expected" + (beyond(4) == 3 ? say : ""));
+  const bool vector = beyond(5) > 1, may_be_vector = header.intent_code == 1006 || header.intent_code == 1007 ||
+                                                     (vectors == NiftiVectors::declared && beyond(5) == 3);
+  require(!vector || may_be_vector,
+          std::to_string(beyond(5)) + " values a voxel with intent code " + std::to_string(header.intent_code) + ", " +
+              file + "; expected 1 value, or vectors with intent code 1006 or 1007" + (beyond(5) == 3 ? say : ""));
   require(header.intent_code != 1006 || beyond(5) == 3 || on_fourth,
           "displacement vectors (intent code 1006, DISPVECT) of " + std::to_string(beyond(5)) + " values, " + file +
               "; expected 3");

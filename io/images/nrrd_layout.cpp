@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/images/header_words.h"
 #include "io/lower_case.h"
 
@@ -19,9 +19,8 @@ namespace {
 std::int64_t whole_number(const TextHeader& text, const char* name, const std::string& file) {
   const std::string value = trimmed(text[name]);
   const auto number = value.empty() ? std::int64_t{0} : number_from<std::int64_t>(value);
-  require(number.has_value(),
-          "the field \"" + std::string(name) + "\" is \"" + value.substr(0, 60) + "\", " + file +
-              "; expected a whole number");
+  require(number.has_value(), "the field \"" + std::string(name) + "\" is \"" + value.substr(0, 60) + "\", " + file +
+                                  "; expected a whole number");
   return *number;
 }
 

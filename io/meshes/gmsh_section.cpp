@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/points/points_document.h"
 
 namespace tetwarp {

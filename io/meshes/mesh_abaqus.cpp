@@ -57,14 +57,24 @@ std::string compact_lower(std::string_view text) {
   return compact;
 }
 
+/// Whether a line goes on in the next one.
+bool ends_with_comma(std::string_view line) {
+  const std::size_t last = line.find_last_not_of(" \t\r");
+  return last != std::string_view::npos && line[last] == ',';
+}
+
 class AbaqusReader final : public MeshReader {
  public:
   explicit AbaqusReader(const std::filesystem::path& path) : MeshReader(path), file_(path.string()), model_(file_) {
     format = "Abaqus input";
     std::ifstream stream(path, std::ios::binary);
-    for (std::string line; std::getline(stream, line);) {
+    const auto next = [&](std::string& line) {
       ++number_;
+      return static_cast<bool>(std::getline(stream, line));
+    };
+    for (std::string line; next(line);) {
       if (line.starts_with("**") || line.find_first_not_of(" \t\r") == std::string::npos) continue;
+      for (std::string more; line.front() == '*' && ends_with_comma(line) && next(more);) line += more;
       if (line.front() == '*')
         take_keyword(line);
       else
@@ -92,8 +102,12 @@ class AbaqusReader final : public MeshReader {
             keyword + here() + " is not read; write a model with all nodes and elements in it");
     parts_ += keyword == "*part" ? 1 : 0;
     require(parts_ <= 1, "a second *PART" + here() + "; write a model of one part");
+    // What an assembly adds, such as reference points, has numbers of its own.
+    if (keyword == "*assembly" || keyword == "*endassembly") in_assembly_ = keyword == "*assembly";
     in_instance_ = keyword == "*instance";
-    block_ = keyword == "*node" ? Block::nodes : keyword == "*element" ? Block::elements : Block::other;
+    block_ = Block::other;
+    if (!in_assembly_ && keyword == "*node") block_ = Block::nodes;
+    if (!in_assembly_ && keyword == "*element") block_ = Block::elements;
     if (block_ == Block::other) return;
     std::string type;
     for (std::size_t n = 1; n < words.size(); ++n) {
@@ -126,7 +140,7 @@ class AbaqusReader final : public MeshReader {
     if (!solid_) {
       // A line that ends with a comma goes on in the next, which is no element of its own.
       if (!goes_on_) model_.leave_out(upper_type());
-      goes_on_ = line.find_last_not_of(" \t\r") != std::string::npos && line[line.find_last_not_of(" \t\r")] == ',';
+      goes_on_ = ends_with_comma(line);
       return;
     }
     for (const std::string_view word : split_at_commas(line)) {
@@ -159,7 +173,7 @@ class AbaqusReader final : public MeshReader {
   ModelBuilder model_;
   std::int64_t number_ = 0;  ///< of the line
   Block block_ = Block::other;
-  bool in_instance_ = false, goes_on_ = false;
+  bool in_assembly_ = false, in_instance_ = false, goes_on_ = false;
   int parts_ = 0;
   std::string type_;
   const Solid* solid_ = nullptr;

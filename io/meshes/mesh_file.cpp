@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/images/image_reader.h"
 #include "io/meshes/mesh_format.h"
 #include "io/meshes/model_builder.h"
@@ -52,18 +52,18 @@ std::int64_t step_of(const FieldSource& source) {
   return *step;
 }
 
-/// The name of an array for messages: "U", or "U, step 3" where there are several steps.
-std::string name_of(const MeshReader& reader, const MeshVectors& array) {
+/// The name of an array for messages: "U", or "U, step 3" where there are several steps, or they are `wanted`.
+std::string name_of(const MeshReader& reader, const MeshVectors& array, bool wanted = false) {
   const auto steps = std::count_if(reader.arrays.begin(), reader.arrays.end(),
                                    [&](const MeshVectors& other) { return other.name == array.name; });
-  return array.name + (array.step && steps > 1 ? ", step " + std::to_string(*array.step) : "");
+  return array.name + (array.step && (wanted || steps > 1) ? ", step " + std::to_string(*array.step) : "");
 }
 
-/// The names of all arrays, for the end of a message: `; it has "A", "B"`.
-std::string listed(const MeshReader& reader) {
+/// The names of all arrays, for the end of a message: `; it has "A", "B"`. @param steps  whether with their steps
+std::string listed(const MeshReader& reader, bool steps = false) {
   std::string text;
   for (const MeshVectors& array : reader.arrays)
-    text += (text.empty() ? "; it has \"" : ", \"") + name_of(reader, array) + "\"";
+    text += (text.empty() ? "; it has \"" : ", \"") + name_of(reader, array, steps) + "\"";
   return text.empty() ? "; it has no vectors at its vertices" : text;
 }
 
@@ -86,7 +86,7 @@ std::optional<std::size_t> chosen_vectors(const MeshReader& reader, const FieldS
     if (array.name == name && (!source.options.contains("step") || array.step == step_of(source))) found.push_back(n);
   }
   require(!found.empty(),
-          "no step " + source.option("step") + " of \"" + name + "\", " + source.path.string() + listed(reader));
+          "no step " + source.option("step") + " of \"" + name + "\", " + source.path.string() + listed(reader, true));
   return found.size() == 1 ? std::optional(found[0]) : std::nullopt;
 }
 
@@ -121,6 +121,10 @@ std::vector<glm::dvec3> from_deformed(const MeshReader& rest, const FieldSource&
       "another frame or other units, " + both);
   std::vector<glm::dvec3> displacement = std::move(deformed->points);
   for (std::size_t v = 0; v < displacement.size(); ++v) displacement[v] -= rest.points[v];
+  const bool rests = std::ranges::all_of(displacement, [](const glm::dvec3& by) { return by == glm::dvec3(0); });
+  require(!rests || deformed->arrays.empty(), "the vertices of " + path + " rest where those of " +
+                                                  source.path.string() + " do" + listed(*deformed) +
+                                                  ": give that file by itself");
   return displacement;
 }
 
@@ -131,8 +135,10 @@ std::vector<glm::dvec3> from_table(const MeshReader& reader, const FieldSource& 
   require_readable_file(path);
   std::ifstream stream(path, std::ios::binary);
   std::vector<glm::dvec3> displacement(reader.points.size(), glm::dvec3(NAN));
+  std::vector<bool> seen(reader.points.size());
   std::int64_t number = 0;
   for (std::string line; std::getline(stream, line);) {
+    if (number == 0 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a byte order mark of UTF-8
     ++number;
     std::ranges::replace_if(
         line, [](char c) { return c == ',' || c == ';' || c == '\t' || c == '\r'; }, ' ');
@@ -141,12 +147,16 @@ std::vector<glm::dvec3> from_table(const MeshReader& reader, const FieldSource& 
     std::size_t count = 0;
     while (count < word.size() && words >> word[count]) ++count;
     const std::string where = " in line " + std::to_string(number) + " of " + path.string();
-    const bool heading = number == 1 && count > 0 && word[0].find_first_not_of("0123456789") != std::string::npos;
+    // A heading names columns: none of its words is a number.
+    const auto is_number = [](const std::string& text) { return number_from<double>(text).has_value(); };
+    const bool heading = number == 1 && std::none_of(word.begin(), word.begin() + count, is_number);
     if (count == 0 || word[0].starts_with('#') || heading) continue;
     require(count == 4, "more or fewer than 4 values" + where + "; expected the number of a vertex and ux, uy, uz");
-    glm::dvec3& vector = displacement[vertex_numbered(reader, whole_in(word[0], where), where)];
-    require(std::isnan(vector.x), "the vertex " + word[0] + " a second time" + where);
-    for (int axis = 0; axis < 3; ++axis) vector[axis] = real_in(word[static_cast<std::size_t>(axis) + 1], where);
+    const std::uint32_t vertex = vertex_numbered(reader, whole_in(word[0], where), where);
+    require(!seen[vertex], "the vertex " + word[0] + " a second time" + where);
+    seen[vertex] = true;
+    for (int axis = 0; axis < 3; ++axis)
+      displacement[vertex][axis] = real_in(word[static_cast<std::size_t>(axis) + 1], where);
   }
   return displacement;
 }

@@ -41,8 +41,24 @@ class Lines {
  public:
   explicit Lines(const std::filesystem::path& path) : file_(path.string()), stream_(path, std::ios::binary) {}
 
+  /// A line of the file: where it begins, and its number.
+  struct Place {
+    std::streamoff byte = 0;
+    std::int64_t number = 0;
+  };
+
+  /// The place of the line that `next` read.
+  Place place() const { return {byte_, number_}; }
+  /// Goes to a line of an earlier `place`, which `next` then reads.
+  void go_to(const Place& place) {
+    stream_.clear();
+    stream_.seekg(place.byte);
+    number_ = place.number - 1;
+  }
+
   bool next() {
     ++number_;
+    byte_ = stream_.tellg();
     if (!std::getline(stream_, line_)) return false;
     if (line_.ends_with('\r')) line_.pop_back();
     return true;
@@ -66,6 +82,7 @@ class Lines {
   std::string file_, line_;
   std::ifstream stream_;
   std::int64_t number_ = 0;
+  std::streamoff byte_ = 0;
 };
 
 class FrdReader final : public MeshReader {
@@ -93,9 +110,27 @@ class FrdReader final : public MeshReader {
     require(has_nodes && ended, "no end of the results (9999), " + file_ + "; is the file whole?");
   }
 
-  std::vector<glm::dvec3> vectors(std::size_t n) const override { return data_[n]; }
+  std::vector<glm::dvec3> vectors(std::size_t n) const override {
+    const Block& block = blocks_[n];
+    Lines lines(file_);
+    lines.go_to(block.first);
+    std::vector<glm::dvec3> values(points.size(), glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
+    for (std::size_t count = 0; count < block.values; ++count) {
+      lines.need();
+      const std::uint32_t vertex = vertex_numbered(*this, lines.whole(3, block.width), lines.here());
+      for (int axis = 0; axis < 3; ++axis)
+        values[vertex][axis] = lines.real(3 + block.width + 12 * static_cast<std::size_t>(axis), 12);
+    }
+    return values;
+  }
 
  private:
+  /// The values of a result, a line each.
+  struct Block {
+    Lines::Place first;
+    std::size_t width = 0, values = 0;  ///< width of a node's number
+  };
+
   /// Reads the width of a number of a node: the format behind the header of a block. @throws InputError for binary
   std::size_t width_of(const Lines& lines, std::size_t column) const {
     const std::int64_t form = lines.whole(column, lines.size());
@@ -137,9 +172,9 @@ class FrdReader final : public MeshReader {
     }
   }
 
-  /// Takes a block of results, if it has vectors.
+  /// Remembers where a block of results is, if it has vectors.
   void take_results(Lines& lines) {
-    const std::int64_t step = lines.whole(58, 5);
+    const std::int64_t expected = lines.whole(24, 12), step = lines.whole(58, 5);
     const std::size_t width = width_of(lines, 73);
     lines.need();
     require(lines.starts_with(" -4"), "no name of the results" + lines.here());
@@ -148,22 +183,21 @@ class FrdReader final : public MeshReader {
     std::size_t components = 0;
     for (lines.need(); lines.starts_with(" -5"); lines.need())
       components += lines.columns(33, 5).find('1') == std::string_view::npos ? 1 : 0;  // 1: computed, not in the file
-    const bool vectors = components == 3;
-    std::vector<glm::dvec3> values(vectors ? points.size() : 0, glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
-    for (; !lines.starts_with(" -3"); lines.need()) {
-      if (!vectors || !lines.starts_with(" -1")) continue;
-      const std::uint32_t vertex = vertex_numbered(*this, lines.whole(3, width), lines.here());
-      for (int axis = 0; axis < 3; ++axis)
-        values[vertex][axis] = lines.real(3 + width + 12 * static_cast<std::size_t>(axis), 12);
-    }
-    if (!vectors) return;
+    Block block{lines.place(), width, 0};
+    for (; lines.starts_with(" -1") || lines.starts_with(" -2"); lines.need())
+      block.values += lines.starts_with(" -1") ? 1 : 0;
+    require(lines.starts_with(" -3") && static_cast<std::int64_t>(block.values) == expected, [&] {
+      return std::to_string(block.values) + " values of " + name + " before" + lines.here().substr(3) + "; " +
+             std::to_string(expected) + " are expected";
+    });
+    if (components != 3) return;
     arrays.push_back({name, step});
-    data_.push_back(std::move(values));
+    blocks_.push_back(block);
   }
 
   std::string file_;
   ModelBuilder model_;
-  std::vector<std::vector<glm::dvec3>> data_;  ///< for each of `arrays`
+  std::vector<Block> blocks_;  ///< for each of `arrays`
 };
 
 bool recognizes(const std::filesystem::path& path, std::string_view) {

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 
 namespace tetwarp {
 namespace {
@@ -76,7 +76,8 @@ void ModelBuilder::build(MeshReader& reader) {
   if (curved_ > 0)
     reader.notes.push_back(std::to_string(curved_) + " quadratic cells are made linear: only their corners are used");
   for (const auto& [type, count] : left_out_)
-    reader.notes.push_back(std::to_string(count) + " elements of the type " + type + " are left out: no solid");
+    reader.notes.push_back(std::to_string(count) + " elements of the type " + type +
+                           " are left out: they have no volume, or are no finite elements");
 }
 
 std::uint32_t vertex_numbered(const MeshReader& reader, std::int64_t number, const std::string& where) {

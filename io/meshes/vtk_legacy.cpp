@@ -10,7 +10,7 @@
 
 #include "deform/errors.h"
 #include "deform/geometry.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/meshes/slicer_space.h"
 #include "io/meshes/vtk_file.h"
 #include "io/meshes/vtk_text.h"

@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/meshes/slicer_space.h"
 
 namespace tetwarp {

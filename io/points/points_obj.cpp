@@ -5,7 +5,7 @@
 // them are left out.
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "io/points/points_document.h"
 
 namespace tetwarp {

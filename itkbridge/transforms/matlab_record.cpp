@@ -53,31 +53,26 @@ struct Vector {
 
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& path) : file_(path.string()) {
-    std::ifstream stream(path, std::ios::binary);
-    bytes_.resize(std::filesystem::file_size(path));
-    stream.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
-    require(stream.good(), "cannot be read whole, " + file_);
-  }
+  explicit Reader(const std::filesystem::path& path)
+      : file_(path.string()), stream_(path, std::ios::binary), size_(std::filesystem::file_size(path)) {}
 
-  bool at_end() const { return at_ == bytes_.size(); }
+  bool at_end() const { return at_ == size_; }
 
   Vector next() {
-    const MatrixHeader header = header_of(rest());
-    require(header.known, "no vector of MATLAB level 4 at byte " + std::to_string(at_) + " of " + file_ +
+    const std::uint64_t begin = at_;
+    const MatrixHeader header = header_of(take(std::min<std::uint64_t>(kHeaderBytes, size_ - at_)));
+    require(header.known, "no vector of MATLAB level 4 at byte " + std::to_string(begin) + " of " + file_ +
                               "; the file may be damaged");
-    at_ += kHeaderBytes;
     Vector vector;
     vector.name = take(header.name_bytes);
     vector.name.resize(std::min(vector.name.find('\0'), vector.name.size()));
     const std::uint64_t count = std::uint64_t{header.rows} * header.columns;
     const std::size_t size = header.is_float ? sizeof(float) : sizeof(double);
-    require(count <= rest().size() / size, "truncated values of " + vector.name.substr(0, 60) + ", " + file_);
-    const std::string_view values = rest().substr(0, count * size);
-    at_ += values.size();
+    require(count <= (size_ - at_) / size, "truncated values of " + vector.name.substr(0, 60) + ", " + file_);
+    const std::string values = take(count * size);
     vector.values.resize(count);
     for (std::size_t n = 0; n < count; ++n) {
-      const std::string_view one = values.substr(n * size);
+      const std::string_view one = std::string_view(values).substr(n * size);
       vector.values[n] = header.is_float ? static_cast<double>(number<float>(one, header.big_endian))
                                          : number<double>(one, header.big_endian);
     }
@@ -85,16 +80,18 @@ class Reader {
   }
 
  private:
-  std::string_view rest() const { return std::string_view(bytes_).substr(at_); }
-  std::string take(std::size_t count) {
-    require(rest().size() >= count, "truncated, " + file_ + "; is the file whole?");
-    std::string text(rest().substr(0, count));
+  std::string take(std::uint64_t count) {
+    require(count <= size_ - at_, "truncated, " + file_ + "; is the file whole?");
+    std::string bytes(count, '\0');
+    stream_.read(bytes.data(), static_cast<std::streamsize>(count));
+    require(stream_.good(), "cannot be read whole, " + file_);
     at_ += count;
-    return text;
+    return bytes;
   }
 
-  std::string file_, bytes_;
-  std::size_t at_ = 0;
+  std::string file_;
+  std::ifstream stream_;
+  std::uint64_t size_, at_ = 0;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <sstream>
 
 #include "deform/errors.h"
 #include "itkbridge/transforms/transform_record.h"
@@ -39,6 +40,13 @@ std::optional<std::vector<double>> numbers_of(const toml::array& array) {
     numbers.push_back(*number);
   }
   return numbers;
+}
+
+/// A node as TOML writes it, for messages: no reader of transforms takes it.
+std::string text_of(const toml::node& node) {
+  std::ostringstream text;
+  node.visit([&](const auto& value) { text << value; });
+  return text.str();
 }
 
 }  // namespace
@@ -87,6 +95,7 @@ void ParameterFile::read_toml(const std::filesystem::path& path) {
     Value value;
     if (const auto* array = node.as_array()) {
       value.numbers = numbers_of(*array);
+      if (!value.numbers) value.text = text_of(*array);
     } else if (const auto number = node.value<double>(); node.is_number() && number) {
       value.numbers = std::vector<double>{*number};
       value.text = node.is_integer() ? std::to_string(*node.value<std::int64_t>()) : std::to_string(*number);
@@ -94,6 +103,8 @@ void ParameterFile::read_toml(const std::filesystem::path& path) {
       value.text = boolean->get() ? "true" : "false";
     } else if (const auto* text = node.as_string()) {
       value.text = '"' + text->get() + '"';
+    } else {
+      value.text = text_of(node);
     }
     values_.emplace(std::string(key.str()), std::move(value));
   }

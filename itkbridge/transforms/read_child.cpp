@@ -19,7 +19,7 @@
 #include <string>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "itkbridge/transforms/isolated_answer.h"
 
 namespace tetwarp {

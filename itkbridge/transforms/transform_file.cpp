@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "deform/errors.h"
-#include "deform/text_number.h"
+#include "deform/text/text_number.h"
 #include "itkbridge/transforms/elastix_parameters.h"
 #include "itkbridge/transforms/matlab_record.h"
 #include "itkbridge/transforms/parameter_file.h"
@@ -109,9 +109,8 @@ std::vector<double> parse_numbers(std::string_view text, const std::string& wher
        at = text.find_first_not_of(kBlank, at)) {
     const std::string_view word = text.substr(at, text.find_first_of(kBlank, at) - at);
     const auto value = number_from<double>(word);
-    require(value.has_value(), [&] {
-      return "\"" + std::string(word.substr(0, 40)) + "\" where a number is expected, " + where;
-    });
+    require(value.has_value(),
+            [&] { return "\"" + std::string(word.substr(0, 40)) + "\" where a number is expected, " + where; });
     values.push_back(*value);
     at += word.size();
   }
@@ -124,6 +123,9 @@ StoredTransform read_transform(const std::filesystem::path& path, const std::sto
   if (magic.starts_with(kText)) return {TransformTool::itk, parts_of(TextReader(path).read(), file)};
   if (magic.starts_with(kPlastimatchMagic)) return {TransformTool::plastimatch, {read_plastimatch_spline(path)}};
   if (is_matlab_record(magic)) return {TransformTool::itk, parts_of(read_matlab_records(path), file)};
+  require(!magic.starts_with("MATLAB "),
+          "a MAT-file of MATLAB 5 or later, " + file +
+              ", which no program writes for a transform but SPM; save its 4 x 4 matrix as text and give tool=");
   require(is_elastix_file(path), "not a transform file, " + file +
                                      "; expected ITK's HDF5, text (#Insight Transform File V1.0) or .mat, elastix's "
                                      "parameters or plastimatch's B-spline");

@@ -55,7 +55,7 @@ nb::tuple read_pull(const std::vector<std::string>& texts, const Geometry& volum
   std::optional<apps::ReadPullField> read;
   run_call(options, false, [&](const Control& control) {
     const apps::PullChoice choice = apps::parse_pull_fields(texts, frame_of(nifti_frame));
-    read = apps::read_field(choice, volume, straightened(volume), threads_of(threads), control);
+    read = apps::read_field(choice, straightened(volume), threads_of(threads), control);
   });
   const Geometry grid = read->field.grid;
   return nb::make_tuple(grid, as_numpy(grid, std::move(read->field.displacement)), read->origin.notes);

@@ -36,6 +36,23 @@ def _field(case):
     return tw.read_field(case["pull_field"], like=like, direction="pull")
 
 
+@pytest.mark.parametrize("name", ["warp.npz", "WARP.NPZ"])
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_an_array_of_an_archive_is_read_a_piece_at_a_time(tmp_path, monkeypatch, save, name):
+    monkeypatch.chdir(tmp_path)
+    by = np.random.default_rng(5).normal(size=(30, 40, 50, 3)).astype(np.float32)
+    with open(name, "wb") as file:
+        save(file, first=by[:2], vol=by)
+    like = tw.Volume(np.zeros((30, 40, 50), np.int16), tw.Geometry((50, 40, 30)))
+    field = tw.read_field(f"{name}:key=vol,order=zyx,units=mm", like=like, direction="pull")
+    assert np.array_equal(np.asarray(field.displacement), by)
+    whole = pathlib.Path(name).read_bytes()
+    at = len(whole) * 3 // 4  # of the values of vol
+    pathlib.Path(name).write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+    with pytest.raises(tw.InputError, match="damaged"):
+        tw.read_field(f"{name}:key=vol,order=zyx,units=mm", like=like, direction="pull")
+
+
 def test_there_are_cases():
     assert len(CASES) >= 15
 

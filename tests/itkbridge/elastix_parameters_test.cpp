@@ -155,6 +155,23 @@ TEST(ElastixParameters, CirclesAndOtherBadFilesAreRefused) {
   }
 }
 
+TEST(ElastixParameters, WordsOfTomlAreNoNumbers) {
+  const Scratch scratch;
+  const std::string good =
+      "NumberOfParameters = 3\nTransform = \"TranslationTransform\"\nTransformParameters = [3, 5, 7]\n"
+      "FixedImageDimension = 3\nMovingImageDimension = 3\nInitialTransformParameterFileName = \"NoInitialTransform\"\n"
+      "HowToCombineTransforms = \"Compose\"\n";
+  const auto read = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    write_file(scratch / "a.toml", text);
+    return refusal([&] { read_transform_file(scratch / "a.toml"); });
+  };
+  EXPECT_EQ(read("[3, 5, 7]", "[3.0, 5, 7]"), "");
+  EXPECT_TRUE(says(read("[3, 5, 7]", "[\"three\", 5, 7]"), {"where a number is expected", "a.toml"}));
+  EXPECT_TRUE(says(read("[3, 5, 7]", "1979-05-27"), {"where a number is expected", "a.toml"}));
+}
+
 /// Where transformix moves points, or nothing where it is not installed.
 std::vector<glm::dvec3> transformix(const std::filesystem::path& folder, const std::string& file,
                                     const std::vector<glm::dvec3>& points) {

@@ -165,6 +165,24 @@ TEST(FieldFormats, ASplineOfNiftyRegIsATransformOnItsImageAndOnOtherGrids) {
   EXPECT_NE(info.find("direction    output to input (pull)"), std::string::npos) << info;
 }
 
+/// Beyond the grid of the first of several fields the others are not applied.
+TEST(FieldFormats, PointsDoNotRestWhereALaterPullFieldMovesThem) {
+  const Scratch scratch;
+  make_phantom_file(scratch, "in.mha");
+  write_field_file(scratch / "pull.mha", PullField{turned_grid(), corner_displacement(turned_grid())});
+  write_file(scratch / "shift.mat", "1 0 0 9\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  const auto run = [&](const std::string& fields, const std::string& outside) {
+    return run_tetwarp(scratch.path(), "deform in.mha " + fields + " -o out.mha --overwrite --outside " + outside);
+  };
+  const std::string shift = " --pull-field shift.mat:tool=c3d";
+  const Outcome rest = run("--pull-field pull.mha" + shift, "rest");
+  EXPECT_EQ(rest.status, 4);
+  EXPECT_NE(rest.err.find("pull.mha does not reach over the whole output"), std::string::npos) << rest.err;
+  EXPECT_EQ(run("--pull-field pull.mha" + shift, "background").status, 0);
+  EXPECT_EQ(run(shift + " --pull-field pull.mha", "rest").status, 0) << "the first is everywhere";
+  EXPECT_EQ(run("--pull-field pull.mha", "rest").status, 0);
+}
+
 TEST(FieldFormats, AnArrayLiesOnTheVolumeOnceOrderAndUnitsAreGiven) {
   const Scratch scratch;
   make_phantom_file(scratch, "in.mha");
@@ -189,6 +207,11 @@ TEST(FieldFormats, AnArrayLiesOnTheVolumeOnceOrderAndUnitsAreGiven) {
     EXPECT_TRUE(run.err.starts_with("tetwarp: error: ")) << run.err;
     EXPECT_FALSE(std::filesystem::exists(scratch / "no.mha"));
   }
+  // A run that is only planned looks at the size too.
+  const Outcome planned =
+      run_tetwarp(scratch.path(), "deform in.mha --pull-field f.npy:order=xyz,units=mm --dry-run -o no.mha");
+  EXPECT_EQ(planned.status, 4) << planned.err;
+  EXPECT_NE(planned.err.find("with order=zyx it fits"), std::string::npos) << planned.err;
   const std::string bytes = read_text(scratch / "f.npy");
   write_file(scratch / "short.npy", bytes.substr(0, bytes.size() - 1));
   write_file(scratch / "wrong.npy", "#" + bytes.substr(1));

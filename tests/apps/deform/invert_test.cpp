@@ -13,6 +13,7 @@
 #include "io/image_file.h"
 #include "tests/support/program.h"
 #include "tests/support/scratch.h"
+#include "tests/support/write_file.h"
 
 namespace {
 
@@ -137,6 +138,34 @@ TEST(Invert, AShiftGivenAsAPullFieldComesBackExactlyWhereItsGridEndsToo) {
       << run.err;
   for (const glm::vec3& d : read_forward_field(scratch / "f.mha").displacement)
     ASSERT_LT(glm::distance(d, glm::vec3(-6, 9, -4)), 1e-5);
+}
+
+/// A rotation leads far out of the grid at its corners, where nothing may be continued.
+TEST(Invert, AffinePullFieldsAreInvertedExactlyWhereverTheyLead) {
+  const Scratch scratch;
+  ASSERT_EQ(run_tetwarp(scratch.path(), "phantom --size 40,36,24 --spacing 3,3,4 --quiet -o in.mha").status, 0);
+  write_file(scratch / "turn.mat", "0.6 -0.8 0 70\n0.8 0.6 0 -20\n0 0 1 3\n0 0 0 1\n");
+  write_file(scratch / "scale.mat", "0.5 0 0 4\n0 2 0 0\n0 0 1 0\n0 0 0 1\n");
+  const Outcome run = run_tetwarp(
+      scratch.path(),
+      "invert --pull-field turn.mat:tool=greedy --pull-field scale.mat:tool=c3d --like in.mha -o inverse.mha");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(run.err.find("outermost samples"), std::string::npos) << run.err;
+  ASSERT_EQ(run_tetwarp(scratch.path(),
+                        "field scale.mat:tool=c3d,invert=yes turn.mat:tool=greedy,invert=yes --like in.mha -o "
+                        "exact.mha")
+                .status,
+            0);
+  const VertexField inverse = read_forward_field(scratch / "inverse.mha"),
+                    exact = read_forward_field(scratch / "exact.mha");
+  ASSERT_EQ(inverse.displacement.size(), exact.displacement.size());
+  float largest = 0, length = 0;
+  for (std::size_t v = 0; v < exact.displacement.size(); ++v) {
+    largest = std::max(largest, glm::distance(inverse.displacement[v], exact.displacement[v]));
+    length = std::max(length, glm::length(exact.displacement[v]));
+  }
+  EXPECT_LT(largest, 2e-3F);  // places of vertices are snapped before they are inverted, here with a factor of two
+  EXPECT_GT(length, 100.0F);
 }
 
 TEST(Invert, PullFieldsThatCannotBeInvertedAreRefused) {

@@ -4,10 +4,12 @@
 // What a text of -f and --pull-field is parsed into, and what the value says.
 #include <gtest/gtest.h>
 
+#include "apps/cli/input.h"
 #include "apps/fields/read_field.h"
 #include "deform/fields/formula.h"
 #include "io/transform_file.h"
 #include "tests/support/field_texts.h"
+#include "tests/support/image_samples.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
 #include "tests/support/write_file.h"
@@ -143,7 +145,7 @@ TEST_F(FieldFiles, OfSeveralPullFieldsAreComposedInTheirOrder) {
   write_file(scratch_ / "scale.mat", "1 0 0 0\n0 0.5 0 1\n0 0 1 0\n0 0 0 1\n");
   const std::string scale = at("scale.mat") + ":tool=greedy";  // LPS: y becomes y / 2 - 1
   const auto composed = [&](const std::vector<std::string>& texts) {
-    return read_field(parse_pull_fields(texts, NiftiFrame::sform), kVolume, kVolume, 1, {});
+    return read_field(parse_pull_fields(texts, NiftiFrame::sform), kVolume, 1, {});
   };
   const auto moved = [&](const ReadPullField& read, const glm::i64vec3& i) {
     const Geometry& grid = read.field.grid;
@@ -158,7 +160,9 @@ TEST_F(FieldFiles, OfSeveralPullFieldsAreComposedInTheirOrder) {
   EXPECT_EQ(moved(field_first, {2, 5, 1}), glm::dvec3(0 + 0.25 * 6, 6 / 2 - 1, -3));
   EXPECT_EQ(moved(matrix_first, {2, 4, 1}), glm::dvec3(4 + 0.25 * 3, 8 / 2 - 1, 3));
   EXPECT_EQ(moved(matrix_first, {2, 3, 1}), glm::dvec3(4 + 0.25 * 2, 6 / 2 - 1, 3)) << "between samples";
-  EXPECT_EQ(field_first.origin.files.size(), 1u);
+  ASSERT_EQ(field_first.origin.files.size(), 2u);
+  EXPECT_EQ(field_first.origin.files[0].parts[0].sha256, hash_file(at("sheared.mha")));
+  EXPECT_EQ(field_first.origin.files[1].parts[0].sha256, hash_file(at("scale.mat")));
 
   // What leads out of the grid of a later field has no source, and is counted.
   write_file(scratch_ / "far.mat", "1 0 0 -12\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");  // LPS: x + 12
@@ -170,7 +174,18 @@ TEST_F(FieldFiles, OfSeveralPullFieldsAreComposedInTheirOrder) {
 
   // A transform that leads the other way is refused, its inverse is not.
   EXPECT_EQ(moved(composed({scale + ",invert=yes"}), {0, 1, 0}), glm::dvec3(0, 6, 0));
+  EXPECT_TRUE(composed({scale + ",invert=yes"}).origin.notes.empty());
   EXPECT_EQ(text_of(parse_pull_fields({"a.mha", scale}, NiftiFrame::sform)), "a.mha, then " + scale);
+
+  // An array has no place of its own: it lies on the output, and behind another field nowhere.
+  const std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (4, 5, 6, 3), }\n";
+  write_file(scratch_ / "array.npy", std::string("\x93NUMPY\x01\0", 8) + static_cast<char>(header.size()) + '\0' +
+                                         header + std::string(4 * 5 * 6 * 3 * sizeof(float), '\0'));
+  const std::string array = at("array.npy") + ":order=zyx,units=mm";
+  EXPECT_EQ(composed({array}).field.grid, kVolume);
+  EXPECT_TRUE(says(refusal([&] { composed({scale, array}); }), {"array.npy", "no place of its own"}));
+  EXPECT_FALSE(is_affine(parse_pull_fields({scale, at("sheared.mha")}, NiftiFrame::sform)));
+  EXPECT_TRUE(is_affine(parse_pull_fields({scale, scale + ",invert=yes"}, NiftiFrame::sform)));
 }
 
 TEST(FieldChoice, FilesGetOtherNamesAndFormulasStay) {
@@ -195,11 +210,11 @@ TEST_F(FieldFiles, AreReadAsTheyAreTitled) {
   const ReadForwardField lattice = read_field(parse({at("lattice.mha")}), kVolume, 1, {});
   EXPECT_EQ(hash_field(lattice.field, 1), hash_field(twist(kVolume, 0.1, 1), 1));
   ASSERT_EQ(lattice.origin.files.size(), 1u);
-  EXPECT_EQ(lattice.origin.files[0].path, at("lattice.mha"));
+  EXPECT_EQ(lattice.origin.files[0].parts[0].path, at("lattice.mha"));
   EXPECT_FALSE(lattice.origin.identity);
   EXPECT_TRUE(read_field(parse({"identity", "identity"}), kVolume, 1, {}).origin.identity);
   if (!reads_transforms()) GTEST_SKIP() << "no ITK in this build";
-  const ReadPullField moved = read_field(parse_pull(at("second.txt")), kVolume, kVolume, 1, {});
+  const ReadPullField moved = read_field(parse_pull(at("second.txt")), kVolume, 1, {});
   EXPECT_EQ(moved.field.displacement.front(), glm::vec3(2, 0, 0)) << "both translations";
 }
 

@@ -69,6 +69,7 @@ TEST(MatrixFile, SaysWhoseItIsOrIsRefused) {
     const TransformFile back = read_transform_file(with(scratch / "a.mat", std::string("invert=yes,tool=") + tool));
     EXPECT_LT(glm::distance(back.displacement(glm::dvec3(20, 30, 40)), glm::dvec3(3, 5, -7)), 1e-12) << tool;
     EXPECT_FALSE(back.direction.has_value());
+    EXPECT_TRUE(back.inverted && !file.inverted);
   }
 }
 
@@ -83,8 +84,10 @@ TEST(MatrixFile, OtherTextsAreRefusedByName) {
   EXPECT_TRUE(says(refused("1 0 0 3 0 1 0 5 0 0 1 7 0 0 0.1 1"), {"last row"}));
   EXPECT_TRUE(says(refused("1 0 0 nan 0 1 0 5 0 0 1 7 0 0 0 1"), {"not finite"}));
   EXPECT_TRUE(says(refused("1 0 0 x 0 1 0 5 0 0 1 7 0 0 0 1"), {"\"x\""}));
-  write_file(scratch / "a.mat", "0 0 0 3 0 1 0 5 0 0 1 7 0 0 0 1");
-  EXPECT_TRUE(says(refused_transform(scratch / "a.mat", "tool=greedy,invert=yes"), {"no inverse", "a.mat"}));
+  EXPECT_TRUE(says(refused("0 0 0 3 0 1 0 5 0 0 1 7 0 0 0 1"), {"without an inverse (determinant 0.0", "a.mat"}));
+  EXPECT_TRUE(says(refused("1 1 0 3 1 1 1e-11 5 0 0 1 7 0 0 0 1"), {"without an inverse"})) << "but for rounding";
+  EXPECT_EQ(refused("+1e-3 0 0 +3 0 +1e-3 0 5 0 0 1e-3 7 0 0 0 1"), "") << "small, with signs";
+  EXPECT_TRUE(says(refused("+-1 0 0 3 0 1 0 5 0 0 1 7 0 0 0 1"), {"\"+-1\""}));
 }
 
 TEST(LtaFile, WhatIsTruncatedOrOfAnotherKindIsRefused) {
@@ -101,6 +104,15 @@ TEST(LtaFile, WhatIsTruncatedOrOfAnotherKindIsRefused) {
   write_file(scratch / "a.lta", other);
   EXPECT_TRUE(says(refused_transform(scratch / "a.lta"), {"type 14.000000", "lta_convert"}));
   EXPECT_EQ(read_transform_file(file).direction, Direction::forward);
+  // Between RAS coordinates the places of the volumes are not needed; between voxels they are.
+  const auto without_places = [&](const std::string& name) {
+    std::string changed = read_bytes(kCases / name / "affine.lta");
+    for (std::size_t at = 0; (at = changed.find("valid = 1", at)) != std::string::npos;) changed[at + 8] = '0';
+    write_file(scratch / "a.lta", changed);
+    return refused_transform(scratch / "a.lta");
+  };
+  EXPECT_EQ(without_places("freesurfer-lta-ras"), "");
+  EXPECT_TRUE(says(without_places("freesurfer-lta-voxel"), {"between voxels", "not valid", "a.lta"}));
 }
 
 TEST(MgzField, TruncationAndOtherFilesAreRefused) {
@@ -123,6 +135,56 @@ TEST(MgzField, TruncationAndOtherFilesAreRefused) {
   write_file(scratch / "a.mgz", plain.substr(0, 284 + 96 + 20));
   EXPECT_TRUE(says(refused_field(scratch / "a.mgz"), {"the form of the vectors is not stated"}));
   EXPECT_TRUE(says(refused_field(scratch / "a.mgz", "frame=ras"), {"option"}));
+  EXPECT_TRUE(says(refused_field(scratch / "a.mgz", "invert=yes"), {"tetwarp invert", "a.mgz"}));
+}
+
+/// A number as MGH has it: the highest byte first.
+std::string big_endian(std::int32_t value) {
+  const auto bits = static_cast<std::uint32_t>(value);
+  return {static_cast<char>(bits >> 24), static_cast<char>(bits >> 16), static_cast<char>(bits >> 8),
+          static_cast<char>(bits)};
+}
+
+TEST(MgzField, TagsWithoutALengthAreSkippedAndNoneMayBeCut) {
+  const Scratch scratch;
+  const std::string plain = read_bytes(std::filesystem::path(TETWARP_FUZZ_CORPUS) / "mgz" / "plain.mgz");
+  const FieldFile expected = read_field_file(std::filesystem::path(TETWARP_FUZZ_CORPUS) / "mgz" / "plain.mgz");
+  const std::int64_t vertices = voxel_count(expected.grid);
+  const std::size_t tags = 284 + 12 * static_cast<std::size_t>(vertices) + 20;
+  // mri_warp_convert puts the labels of all vertices before the form of the vectors.
+  std::string labels = big_endian(12);
+  for (std::int32_t n = 0; n < vertices; ++n) labels += big_endian(13 - n);
+  const std::string whole = plain.substr(0, tags) + big_endian(11) + big_endian(2) + labels + plain.substr(tags);
+  write_file(scratch / "a.mgz", whole);
+  EXPECT_EQ(read_field_file(scratch / "a.mgz").displacement, expected.displacement);
+  for (std::size_t size = 0; size < whole.size(); size += size < 90 ? 1 : 4) {
+    write_file(scratch / "a.mgz", whole.substr(0, size));
+    const std::string why = refused_field(scratch / "a.mgz");
+    // Between two tags a file may end.
+    EXPECT_TRUE(says(why, {"truncated", "a.mgz"}) || says(why, {"empty", "a.mgz"}) ||
+                says(why, {"the form of the vectors is not stated", "a.mgz"}) || (why.empty() && size > tags + 20))
+        << size << why;
+    EXPECT_TRUE(size == 0 || size >= tags || says(why, {"truncated"})) << size << why;
+  }
+  const std::size_t form = plain.find(big_endian(13), tags);
+  ASSERT_NE(form, std::string::npos);
+  write_file(scratch / "a.mgz", plain.substr(0, form + 11) + '\x03' + plain.substr(form + 12));
+  EXPECT_TRUE(says(refused_field(scratch / "a.mgz"), {"tag 13 of 3 bytes"}));
+}
+
+TEST(MgzField, AWarpWithFewerVerticesThanItsTargetHasVoxelsIsRefused) {
+  const Scratch scratch;
+  const std::filesystem::path plain = std::filesystem::path(TETWARP_FUZZ_CORPUS) / "mgz" / "plain.mgz";
+  const glm::i64vec3 size = read_field_header(plain).grid.size;
+  const std::string bytes = read_bytes(plain);
+  const std::size_t tags = 284 + 12 * static_cast<std::size_t>(size.x * size.y * size.z) + 20;
+  std::string geometries = big_endian(10) + std::string(588, '\0') + big_endian(1);  // no source, and a target of
+  for (int axis = 0; axis < 3; ++axis) geometries += big_endian(static_cast<std::int32_t>(2 * size[axis]));
+  const std::string one("\x3f\x80\0\0", 4), zero(4, '\0');
+  for (const char number : std::string("111100010001000")) geometries += number == '1' ? one : zero;
+  geometries += std::string(512, '\0');
+  write_file(scratch / "a.mgz", bytes.substr(0, tags) + geometries + bytes.substr(tags));
+  EXPECT_TRUE(says(refused_field(scratch / "a.mgz"), {"vertices for a target volume of", "a.mgz", "spacing 1"}));
 }
 
 TEST(NpzField, TheKeyIsChosenAndDamageIsRefused) {
@@ -162,10 +224,13 @@ TEST(NiftiField, OptionsSayWhatTheFileDoesNotAndNothingElse) {
   const std::filesystem::path folder = std::filesystem::path(TETWARP_FUZZ_CORPUS) / "nii-vectors";
   const std::filesystem::path volumes = folder / "volumes.nii", spm = folder / "spm.nii";
   // Three volumes may be three times.
-  EXPECT_TRUE(says(refusal([&] { is_field_file(volumes); }), {"3 time points", ":values=displacements|positions"}));
+  EXPECT_TRUE(says(refusal([&] { is_field_file(volumes); }),
+                   {"3 time points", ":values=displacements|positions,frame=lps|ras"}));
   EXPECT_TRUE(is_field_file(with(volumes, "values=positions")));
-  EXPECT_TRUE(says(refused_field(volumes), {"3 time points"}));
-  const FieldFile lps = read_field_file(with(volumes, "values=displacements")),
+  EXPECT_TRUE(says(refused_field(volumes), {"does not state", ":values=displacements|positions,frame=lps|ras"}));
+  for (const char* half : {"values=displacements", "frame=ras"})
+    EXPECT_TRUE(says(refused_field(volumes, half), {"does not state", "volumes.nii"})) << half;
+  const FieldFile lps = read_field_file(with(volumes, "values=displacements,frame=lps")),
                   ras = read_field_file(with(volumes, "values=displacements,frame=ras"));
   EXPECT_EQ(lps.displacement.back(), glm::vec3(3, 5, 7));
   EXPECT_EQ(ras.displacement.back(), glm::vec3(-3, -5, 7));
@@ -174,7 +239,19 @@ TEST(NiftiField, OptionsSayWhatTheFileDoesNotAndNothingElse) {
   EXPECT_EQ(header.absolute_basis, FieldBasis::by_option);
   EXPECT_EQ(header.frame_basis, FieldBasis::by_option);
   EXPECT_TRUE(says(refused_field(volumes, "values=vectors"), {"values=vectors", "displacements or positions"}));
-  EXPECT_TRUE(says(refused_field(volumes, "source=a.nii,values=positions"), {"only the fields of FSL"}));
+  EXPECT_TRUE(says(refused_field(volumes, "source=a.nii,values=positions,frame=ras"), {"only the fields of FSL"}));
+  // nibabel writes five axes without an intent.
+  const Scratch scratch;
+  std::string unstated = read_bytes(volumes);
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    std::int16_t sizes[6] = {5, 0, 0, 0, 1, 3};
+    if (axis == 0 || axis > 3) put(unstated, 40 + 2 * axis, sizes[axis]);
+  }
+  write_file(scratch / "five.nii", unstated);
+  EXPECT_TRUE(says(refusal([&] { is_field_file(scratch / "five.nii"); }),
+                   {"3 values a voxel with intent code 0", ":values=displacements|positions,frame=lps|ras"}));
+  EXPECT_EQ(read_field_file(with(scratch / "five.nii", "values=displacements,frame=ras")).displacement,
+            ras.displacement);
   EXPECT_EQ(read_field_header(spm).direction, Direction::pull);
   EXPECT_TRUE(read_field_header(spm).absolute);
   EXPECT_TRUE(says(refused_field(spm, "values=displacements"), {"holds positions", "spm.nii"}));

@@ -71,6 +71,11 @@ TEST(Calculix, TablesThatDoNotFitAreRefused) {
   EXPECT_TRUE(says(with("1,0,0\n"), {"4 values in line 1"}));
   EXPECT_TRUE(says(with("1,0,0,0,0\n"), {"4 values in line 1"}));
   EXPECT_TRUE(says(with("1,0,x,0\n"), {"\"x\" in line 1"}));
+  EXPECT_EQ(with("\xEF\xBB\xBF" + table), "taken") << "a byte order mark";
+  EXPECT_EQ(with("\xEF\xBB\xBF" + table.substr(table.find("1,0"))), "taken") << "and no heading";
+  EXPECT_TRUE(says(with("1.0,0,0,0\n"), {"\"1.0\" in line 1", "whole number"})) << "no heading";
+  EXPECT_TRUE(says(with("n1,0,0,0\n"), {"\"n1\" in line 1"}));
+  EXPECT_TRUE(says(with("1,nan,0,0\n1,0,0,0\n"), {"vertex 1 a second time", "line 2"}));
   EXPECT_TRUE(says(refused(kModel), {"displacement", "table=FILE"}));
   EXPECT_TRUE(says(refused(kModel, "table=" + path + ",displacement=U"), {"give one of them"}));
   EXPECT_TRUE(says(refused(kModel, "table=absent.csv"), {"absent.csv"}));
@@ -120,6 +125,43 @@ TEST(Abaqus, WhatIsNotReadIsRefusedByName) {
   EXPECT_TRUE(says(with(nodes + cell + cell), {"element 1 is there twice"}));
   EXPECT_TRUE(says(with("*NODE\n1,0,0\n"), {"3 values of a node in line 2"}));
   EXPECT_TRUE(says(with(nodes), {"no cells with a volume"}));
+}
+
+/// Reference points of an assembly have numbers of their own, and a keyword line that ends with a comma goes on.
+TEST(Abaqus, AssembliesAndLongKeywordLinesAreRead) {
+  const Scratch scratch;
+  write_file(
+      scratch / "a.inp",
+      "*PART, NAME=a\n*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,\nTYPE=C3D4\n1,1,2,3,4\n*END PART\n"
+      "*ASSEMBLY, NAME=all\n*INSTANCE, NAME=a-1, PART=a\n*END INSTANCE\n*NODE\n1,9,9,9\n*ELEMENT,TYPE=MASS\n1,1\n"
+      "*END ASSEMBLY\n*STEP\n");
+  write_file(scratch / "u.csv", "1 0 0 0\n2 0 0 0\n3 0 0 0\n4 0 0 1\n");
+  const MeshFile file =
+      read_mesh_file(parse_field_source((scratch / "a.inp").string() + ":table=" + (scratch / "u.csv").string()));
+  ASSERT_EQ(file.mesh.rest.size(), 4U);
+  EXPECT_EQ(file.mesh.rest[0], glm::dvec3(0));
+  EXPECT_EQ(file.header.tetrahedra, 1U);
+}
+
+/// Each step has a block of results, of which one is read.
+TEST(Calculix, StepsAreChosenAndEachIsWhole) {
+  const Scratch scratch;
+  std::string text = read_bytes(kResult);
+  const std::size_t begin = text.find("  100CL"), end = text.find(" -3\n", begin) + 4;
+  std::string second = text.substr(begin, end - begin);
+  second.replace(58, 5, "    7");
+  const std::size_t value = second.find("2.55629E-01");
+  second.replace(value, 11, "5.00000E-01");
+  write_file(scratch / "a.frd", text.substr(0, end) + second + text.substr(end));
+  const std::string path = (scratch / "a.frd").string();
+  EXPECT_TRUE(says(refused(path), {"which vectors", "\"DISP, step 1\", \"DISP, step 7\""}));
+  EXPECT_TRUE(says(refused(path, "step=3"), {"no step 3", "step 7"}));
+  EXPECT_EQ(read_mesh_file(parse_field_source(path + ":step=1")).mesh.displacement[4].x, 2.55629e-01F);
+  EXPECT_EQ(read_mesh_file(parse_field_source(path + ":step=7")).mesh.displacement[4].x, 0.5F);
+  EXPECT_TRUE(says(refused(kResult, "deformed=" + path), {"rest where those of", "DISP"}));
+  text.erase(text.find(" -1         3", begin), text.find(" -1         4", begin) - text.find(" -1         3", begin));
+  write_file(scratch / "a.frd", text);
+  EXPECT_TRUE(says(refused(path), {"11 values of DISP before line", "12 are expected"}));
 }
 
 TEST(Calculix, DamagedResultsAreRefused) {

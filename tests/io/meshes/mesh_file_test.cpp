@@ -53,7 +53,7 @@ TEST(MeshFile, TheDisplacementIsTheOnlyOrTheUsualOneOrRefusedWithAList) {
   write_file(scratch / "a.msh", mesh_with(vectors("whatever", 4, 2)));
   EXPECT_EQ(x_of(read(scratch)), 2);
   EXPECT_EQ(x_of(read(scratch, "step=4")), 2);
-  EXPECT_TRUE(says(refusal(scratch, "step=3"), {"no step 3 of \"whatever\"", "a.msh", "it has \"whatever\""}));
+  EXPECT_TRUE(says(refusal(scratch, "step=3"), {"no step 3 of \"whatever\"", "a.msh", "it has \"whatever, step 4\""}));
   EXPECT_TRUE(says(refusal(scratch, "displacement=U"), {"no vectors called \"U\"", "it has \"whatever\""}));
 
   write_file(scratch / "a.msh", mesh_with(vectors("velocity", 0, 1) + vectors("u", 0, 2)));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/enum_names.h"
+#include "deform/text/enum_names.h"
 
 #include <algorithm>
 #include <iterator>
