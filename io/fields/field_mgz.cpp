@@ -19,6 +19,7 @@
 #include "deform/errors.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
+#include "io/ras.h"
 
 namespace tetwarp {
 namespace {
@@ -26,7 +27,6 @@ namespace {
 constexpr std::uint64_t kDataOffset = 284, kHeaderBytes = 90,  // of the voxels; of what is read of the header
     kScanBytes = 20;                                           // of what stands behind the voxels, before the tags
 constexpr int kFloat = 3;                                      // MRI_FLOAT
-constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 
 // Tags of FreeSurfer (mri.h, tags.h). Some have no length.
 constexpr std::int32_t kTagColours = 1, kTagSurfaceRas = 2, kTagGeometries = 10, kTagMorphType = 11, kTagLabels = 12,

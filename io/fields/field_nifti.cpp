@@ -11,12 +11,12 @@
 #include "io/fields/fsl_frame.h"
 #include "io/fields/transform_niftyreg.h"
 #include "io/images/nifti_file.h"
+#include "io/ras.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr int kDisplacementVector = 1006, kVector = 1007, kFslField = 2006;
-constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
+constexpr int kDisplacementVector = 1006, kVector = 1007;
 
 /// What is refused, by the type of a NiftyReg file (reg-lib/cpu/_reg_maths.h, NREG_TRANS_TYPE, which intent_p1 holds):
 /// the name of a type that cannot be read, null for one that can.
@@ -29,15 +29,15 @@ constexpr std::array<const char*, 7> kNiftyRegRefused = {nullptr,
                                                          "a linear B-spline control point grid"};
 
 void describe_niftyreg(const NiftiHeader& nifti, const std::string& file, FieldFileHeader& header) {
-  const std::string type = std::to_string(nifti.intent_p1);
-  require(nifti.intent_name == "NREG_TRANS" && nifti.intent_p1 >= 0 && nifti.intent_p1 < kNiftyRegRefused.size() &&
-              nifti.intent_p1 == std::floor(nifti.intent_p1),
+  const std::string type = std::to_string(nifti.intent_p.x);
+  require(nifti.intent_name == "NREG_TRANS" && nifti.intent_p.x >= 0 && nifti.intent_p.x < kNiftyRegRefused.size() &&
+              nifti.intent_p.x == std::floor(nifti.intent_p.x),
           "a NiftyReg file of unknown kind (intent_name \"" + nifti.intent_name + "\", intent_p1 " + type + "), " +
               file + "; expected NREG_TRANS and 0 or 1");
-  const char* refused = kNiftyRegRefused[static_cast<std::size_t>(nifti.intent_p1)];
+  const char* refused = kNiftyRegRefused[static_cast<std::size_t>(nifti.intent_p.x)];
   require(refused == nullptr, std::string(refused ? refused : "") + " of NiftyReg (intent_p1 " + type + "), " + file +
                                   "; make a displacement field of it with reg_transform -disp");
-  header.absolute = nifti.intent_p1 == 0;
+  header.absolute = nifti.intent_p.x == 0;
   header.format = std::string("NIfTI, NiftyReg ") + (header.absolute ? "deformation field" : "displacement field");
   header.direction = Direction::pull;
   header.frame = "RAS";
@@ -66,7 +66,7 @@ bool states_vectors(const NiftiHeader& nifti) {
 void require_declared(const NiftiHeader& nifti, const FieldSource& source) {
   const std::string file = source.path.string();
   const bool values = source.options.contains("values");
-  if (is_fsl_intent(nifti.intent_code)) {
+  if (is_fsl_field(nifti.intent_code)) {
     require(values && source.options.contains("source"),
             "a field of FSL leads into its moving image, and does not say whether it holds displacements (relative) or "
             "positions (absolute), " +
@@ -81,10 +81,7 @@ void require_declared(const NiftiHeader& nifti, const FieldSource& source) {
 }
 
 /// A field of FSL, from the coordinates of its own grid to those of the source image, in either form.
-void describe_fsl(const NiftiHeader& nifti, const FieldSource& source, FieldFileHeader& header) {
-  const std::string file = source.path.string();
-  require(nifti.intent_code == kFslField, "coefficients of fnirt (intent code " + std::to_string(nifti.intent_code) +
-                                              "), " + file + "; make a field of them with fnirtfileutils --out");
+void describe_fsl(FieldFileHeader& header) {
   header.format = "NIfTI, FSL field (intent 2006)";
   header.direction = Direction::pull;
   header.frame = "FSL";
@@ -171,7 +168,8 @@ NiftiVectors vectors_of(const FieldSource& source) {
 
 bool holds_field(const FieldSource& source) {
   const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::declared);
-  if (is_fsl_intent(nifti.intent_code)) return true;
+  if (is_fsl_field(nifti.intent_code)) return true;
+  if (is_fsl_coefficients(nifti.intent_code)) return false;
   const ImageHeader header = open_image(source.path, frame_of(source, nifti), vectors_of(source))->header();
   return header.components == 3 && !is_niftyreg_spline(nifti);
 }
@@ -198,12 +196,13 @@ void check_options(const FieldSource& source) {
 std::unique_ptr<FieldReader> open(const FieldSource& source) {
   const std::string file = source.path.string();
   const NiftiHeader nifti = read_nifti_header(source.path, NiftiVectors::declared);
-  const bool fsl = is_fsl_intent(nifti.intent_code);
+  const bool fsl = is_fsl_field(nifti.intent_code);
+  require(!is_fsl_coefficients(nifti.intent_code), "coefficients of fnirt, " + file + ", are a transform, no field");
   require(fsl || !source.options.contains("source"), "source=, " + file + ": only the fields of FSL need that image");
   require_declared(nifti, source);
   FieldFileHeader header;
   header.format = "NIfTI, intent 1007 (VECTOR)";
-  if (fsl) describe_fsl(nifti, source, header);
+  if (fsl) describe_fsl(header);
   auto image = open_vectors(source.path, frame_of(source, nifti), fsl ? NiftiVectors::declared : vectors_of(source));
   header.notes = image->header().notes;
   header.grid = image->header().geometry;

@@ -13,6 +13,7 @@
 #include "io/fields/fsl_frame.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
+#include "io/ras.h"
 
 namespace tetwarp {
 namespace {
@@ -138,7 +139,6 @@ void add_files(const FieldSource& source, std::vector<std::filesystem::path>& fi
 const TransformFormat kTransformFormat_matrix = {recognizes, nullptr, check_options, read, add_files};
 
 AffineMap lps_map_of_ras(std::span<const double, 16> matrix, const std::string& file) {
-  constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
   AffineMap map = map_of(matrix, file);
   for (int column = 0; column < 3; ++column) map.linear[column] *= kLpsFromRas * kLpsFromRas[column];
   map.offset = kLpsFromRas * map.offset + 0.0;  // + 0.0 makes 0 of -0

@@ -3,64 +3,30 @@
 
 #include "io/fields/transform_niftyreg.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <memory>
 
 #include "deform/errors.h"
+#include "io/fields/cubic_spline.h"
 #include "io/fields/field_image.h"
 #include "io/images/image_reader.h"
 #include "io/opened_file.h"
+#include "io/ras.h"
 
 namespace tetwarp {
 namespace {
 
-constexpr glm::dvec3 kLpsFromRas(-1, -1, 1);
 constexpr double kFirstByte = 352;  // where values begin in a file without header extensions
 // Part of the distance of control points: the floats of the header may put the border of the image so far outside.
 constexpr double kRounding = 1e-3;
 
 struct ControlPoints {
   Geometry grid;
-  // LPS mm, i fastest. Displacements are blended, not positions: the B-spline of positions at rest is the identity, so
-  // both give the same.
-  std::vector<glm::dvec3> displacement;
+  // LPS mm. Displacements are blended, not positions: the B-spline of positions at rest is the identity, so both give
+  // the same.
+  CubicSpline displacement;
 };
-
-/// The four control points on one axis that have weight at an index, and their weights.
-struct Support {
-  std::array<std::int64_t, 4> at{};
-  std::array<double, 4> weight{};
-  bool inside = true;
-};
-
-Support support_of(double index, std::int64_t size) {
-  const auto last = static_cast<double>(size - 1), base = std::floor(index), t = index - base, s = 1 - t;
-  Support result;
-  for (std::size_t n = 0; n < 4; ++n)
-    result.at[n] = static_cast<std::int64_t>(std::clamp(base - 1 + static_cast<double>(n), 0.0, last));
-  result.weight = {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6,
-                   t * t * t / 6};
-  result.inside = index >= 1 - kRounding && index <= last - 1 + kRounding;
-  return result;
-}
-
-glm::dvec3 displacement_at(const ControlPoints& points, const glm::dvec3& index, bool& inside) {
-  const glm::i64vec3 size = points.grid.size;
-  const Support x = support_of(index.x, size.x), y = support_of(index.y, size.y), z = support_of(index.z, size.z);
-  inside = x.inside && y.inside && z.inside;
-  glm::dvec3 sum(0);
-  for (std::size_t c = 0; c < 4; ++c) {
-    for (std::size_t b = 0; b < 4; ++b) {
-      const std::int64_t row = size.x * (y.at[b] + size.y * z.at[c]);
-      for (std::size_t a = 0; a < 4; ++a)
-        sum += x.weight[a] * y.weight[b] * z.weight[c] * points.displacement[static_cast<std::size_t>(row + x.at[a])];
-    }
-  }
-  return sum;
-}
 
 ControlPoints read_control_points(const std::filesystem::path& path) {
   const std::string file = path.string();
@@ -73,10 +39,10 @@ ControlPoints read_control_points(const std::filesystem::path& path) {
   require(nifti.vox_offset == kFirstByte, "a control point grid with header extensions (vox_offset " +
                                               std::to_string(nifti.vox_offset) + "), " + file +
                                               "; make a displacement field of it with reg_transform -disp");
-  points.displacement = read_double_vectors(*image);
+  points.displacement = {size, read_double_vectors(*image)};
   const AffineMap rest = point_from_index(points.grid);
-  for (std::size_t v = 0; v < points.displacement.size(); ++v) {
-    glm::dvec3& d = points.displacement[v];
+  for (std::size_t v = 0; v < points.displacement.control.size(); ++v) {
+    glm::dvec3& d = points.displacement.control[v];
     const auto n = static_cast<std::int64_t>(v);
     const glm::i64vec3 at(n % size.x, n / size.x % size.y, n / (size.x * size.y));
     require(glm::length(d) < 1e9, [&] {  // false for NaN
@@ -106,15 +72,15 @@ TransformFile read(const FieldSource& source, const std::stop_token&) {
   TransformFile result;
   result.tool = "NiftyReg";
   result.classes = {"cubic B-spline of " + to_string(points->grid.size) + " control points"};
-  result.parameters = 3 * points->displacement.size();
+  result.parameters = 3 * points->displacement.control.size();
   result.direction = Direction::pull;
   result.beyond = "where its outermost control points go on";
   result.outside = std::make_shared<std::atomic<std::uint64_t>>(0);
   result.displacement = [points, index, outside = result.outside](const glm::dvec3& point) {
-    bool inside = true;
-    const glm::dvec3 by = displacement_at(*points, index(point), inside);
-    if (!inside) outside->fetch_add(1, std::memory_order_relaxed);
-    return by;
+    const glm::dvec3 at = index(point), last(points->grid.size - std::int64_t{2});
+    if (glm::clamp(at, glm::dvec3(1 - kRounding), last + kRounding) != at)
+      outside->fetch_add(1, std::memory_order_relaxed);
+    return points->displacement.at(at);
   };
   return result;
 }
@@ -124,7 +90,7 @@ TransformFile read(const FieldSource& source, const std::stop_token&) {
 const TransformFormat kTransformFormat_niftyreg = {recognizes, holds_transform, nullptr, read, nullptr};
 
 bool is_niftyreg_spline(const NiftiHeader& header) {
-  return header.intent_name == "NREG_TRANS" && header.intent_p1 == 2;
+  return header.intent_name == "NREG_TRANS" && header.intent_p.x == 2;
 }
 
 }  // namespace tetwarp

@@ -23,7 +23,8 @@ struct NiftiHeader {
   std::array<std::int64_t, 8> dim{};
   int components = 1;  ///< values a voxel
   int intent_code = 0, datatype = 0, units = 0, qform_code = 0, sform_code = 0;
-  double vox_offset = 0, scl_slope = 0, scl_inter = 0, intent_p1 = 0;
+  double vox_offset = 0, scl_slope = 0, scl_inter = 0;
+  glm::dvec3 intent_p{};  ///< intent_p1, intent_p2, intent_p3
   std::string descrip, intent_name;
   Geometry qform, sform;           ///< LPS; valid where the code is not 0
   glm::dvec3 pixdim{};             ///< mm
@@ -36,9 +37,10 @@ struct NiftiHeader {
 ///         that is not finite
 NiftiHeader read_nifti_header(const std::filesystem::path& path, NiftiVectors vectors = NiftiVectors::stated);
 
-/// Whether an intent is one of FSL's: a field of displacements, or coefficients of cubic, cosine or quadratic
-/// functions.
-inline bool is_fsl_intent(int intent_code) { return intent_code >= 2006 && intent_code <= 2009; }
+/// Whether an intent is FSL's for a field of displacements.
+inline bool is_fsl_field(int intent_code) { return intent_code == 2006; }
+/// Whether it is one of FSL's for coefficients, of cubic, cosine or quadratic functions.
+inline bool is_fsl_coefficients(int intent_code) { return intent_code >= 2007 && intent_code <= 2009; }
 
 /// The place of the volume: by the form that `frame` names where the header has both, else by the one that it has.
 /// @throws InputError naming the file: neither is there, or the one that decides is sheared, singular, or of another

@@ -117,9 +117,9 @@ int require_one_volume(const NiftiHeader& header, NiftiVectors vectors, const st
   }
   const auto beyond = [&](std::size_t i) { return static_cast<std::int64_t>(i) <= dim[0] ? dim[i] : 1; };
   const bool on_fourth = vectors == NiftiVectors::declared && beyond(4) == 3 && beyond(5) == 1;
-  require(on_fourth || !is_fsl_intent(header.intent_code), "a field or coefficients of FSL (intent code " +
-                                                               std::to_string(header.intent_code) + "), " + file +
-                                                               ", is no volume of one value a voxel");
+  require(on_fourth || !(is_fsl_field(header.intent_code) || is_fsl_coefficients(header.intent_code)),
+          "a field or coefficients of FSL (intent code " + std::to_string(header.intent_code) + "), " + file +
+              ", is no volume of one value a voxel");
   const std::string say = ", or say that they are vectors: " + file + ":values=displacements|positions,frame=lps|ras";
   require(on_fourth || beyond(4) == 1, std::to_string(beyond(4)) + " time points (" + dims + "), " + file +
                                            "; split the file, one volume is expected" + (beyond(4) == 3 ? say : ""));
@@ -219,7 +219,7 @@ NiftiHeader read_nifti_header(const std::filesystem::path& path, NiftiVectors ve
   header.vox_offset = f32(108);
   header.scl_slope = f32(112);
   header.scl_inter = f32(116);
-  header.intent_p1 = f32(56);
+  header.intent_p = {f32(56), f32(60), f32(64)};
   header.units = bytes[123] & 7;
   header.descrip.assign(bytes.begin() + 148, std::find(bytes.begin() + 148, bytes.begin() + 228, 0));
   header.intent_name.assign(bytes.begin() + 328, std::find(bytes.begin() + 328, bytes.begin() + 344, 0));

@@ -361,6 +361,29 @@ def case_fnirt(kind):
     return case
 
 
+def case_fnirt_coefficients(volumes, folder):
+    """Coefficients of fnirt: a cubic B-spline with knots every 4, 3 and 2 voxels, after an affine map of flirt."""
+    import fsl.transform.affine
+    import fsl.transform.flirt
+    import fsl.transform.fnirt
+    import fsl.transform.nonlinear
+
+    fixed, moving = fsl_images(volumes)
+    knots = (4, 3, 2)
+    shape = [-(-(size + 1) // knot) + 2 for size, knot in zip(volumes.fixed.shape, knots)]
+    values = np.random.default_rng(11).normal(scale=3, size=(*shape, 3)).astype(np.float32)
+    field = fsl.transform.nonlinear.CoefficientField(
+        nibabel.Nifti1Image(values, np.eye(4)), moving, fixed, srcSpace="fsl", refSpace="fsl", fieldType="cubic", knotSpacing=knots,
+        fieldToRefMat=fsl.transform.affine.scaleOffsetXform(knots, 0),
+        srcToRefMat=fsl.transform.flirt.toFlirt(np.linalg.inv(MATRIX), moving, fixed, "world", "world"),
+    )
+    fsl.transform.fnirt.toFnirt(field).save(str(folder / "coefficients.nii.gz"))
+    written = fsl.transform.fnirt.readFnirt(str(folder / "coefficients.nii.gz"), moving, fixed)
+    there = written.transform(volumes.points, "world", "world")
+    argument = "coefficients.nii.gz:source=../moving.nii.gz,reference=../fixed.nii.gz"
+    return "FSL fnirt", "fslpy " + version_of("fslpy"), [argument], there, None
+
+
 def case_spm(volumes, folder):
     """A deformation of SPM12 by its published layout: positions in RAS mm, five axes, intent_name Mapping."""
     there = moved(MATRIX, volumes.points) + volumes.displacement().reshape(-1, 3)
@@ -466,6 +489,7 @@ CASES = {
     "fsl-flirt": case_flirt,
     "fsl-fnirt-relative": case_fnirt("relative"),
     "fsl-fnirt-absolute": case_fnirt("absolute"),
+    "fsl-fnirt-coefficients": case_fnirt_coefficients,
     "spm": case_spm,
     "voxelmorph": case_voxelmorph,
 }

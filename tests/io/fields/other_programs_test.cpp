@@ -269,8 +269,46 @@ TEST(NiftiField, AFieldOfFslNeedsItsMovingImage) {
       read_bytes(std::filesystem::path(TETWARP_FUZZ_CORPUS) / "nii-vectors" / "refused-fsl-without-source.nii");
   put(bytes, 68, std::int16_t{2007});
   write_file(scratch / "coefficients.nii", bytes);
-  EXPECT_TRUE(says(refused_field(scratch / "coefficients.nii", "values=displacements,source=a.nii"),
-                   {"coefficients of fnirt", "fnirtfileutils"}));
+  EXPECT_TRUE(says(refused_field(scratch / "coefficients.nii", "values=displacements,frame=lps"),
+                   {"coefficients of fnirt", "a transform"}));
+}
+
+TEST(FnirtCoefficients, LeadBetweenTheirTwoImagesAndNoOthers) {
+  const Scratch scratch;
+  const std::filesystem::path file = std::filesystem::path(TETWARP_FUZZ_CORPUS) / "transform-fnirt" / "cubic.nii";
+  const std::string moving = (kCases / "moving.nii.gz").string(), fixed = (kCases / "fixed.nii.gz").string();
+  const std::string images = "source=" + moving + ",reference=" + fixed;
+  EXPECT_TRUE(is_transform_file(file));
+  EXPECT_FALSE(is_field_file(file));
+  const TransformFile transform = read_transform_file(with(file, images));
+  EXPECT_EQ(transform.direction, Direction::pull);
+  EXPECT_EQ(transform.frame, "FSL");
+  EXPECT_EQ(files_of_transform(with(file, images)).size(), 3U);
+  transform.displacement(point_from_index(read_image_header(fixed).geometry)(glm::dvec3(1, 2, 3)));
+  EXPECT_EQ(transform.outside->load(), 0U);
+  transform.displacement(point_from_index(read_image_header(fixed).geometry)(glm::dvec3(-1, 2, 3)));
+  EXPECT_EQ(transform.outside->load(), 1U);
+  EXPECT_TRUE(says(refused_transform(file), {"two images", "source=MOVING,reference=FIXED"}));
+  EXPECT_TRUE(says(refused_transform(file, images + ",invert=yes"), {"only affine ones"}));
+  EXPECT_TRUE(says(refused_transform(file, images + ",values=positions"), {"\"values\"", "expected source"}));
+  EXPECT_TRUE(says(refused_transform(file, "source=" + fixed + ",reference=" + moving),
+                   {"coefficients for a reference of", "moving.nii.gz has"}));
+  std::string bytes = read_bytes(file);
+  const auto refused = [&](std::size_t offset, auto value) {
+    std::string changed = bytes;
+    put(changed, offset, value);
+    write_file(scratch / "a.nii", changed);
+    return refused_transform(scratch / "a.nii", images);
+  };
+  EXPECT_TRUE(says(refused(68, std::int16_t{2008}), {"cosine coefficients", "fnirtfileutils", "a.nii"}));
+  EXPECT_TRUE(says(refused(68, std::int16_t{2009}), {"quadratic coefficients", "a.nii"}));
+  EXPECT_TRUE(says(refused(254, std::int16_t{0}), {"without qform or sform", "a.nii"}));
+  EXPECT_TRUE(says(refused(352, NAN), {"not finite", "a.nii"}));
+  EXPECT_TRUE(says(refused(56, 1.0F), {"coefficients for a reference", "a.nii"}));
+  expect_truncation_refused(
+      file, "a.nii",
+      [&](const auto& path) { return is_transform_file(path) ? refused_transform(path, images) : "InputError a.nii"; },
+      101);
 }
 
 #ifdef TETWARP_WITH_DCMTK
