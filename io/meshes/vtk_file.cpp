@@ -13,6 +13,7 @@
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
 #include "io/meshes/vtk_text.h"
+#include "io/opened_file.h"
 
 namespace tetwarp {
 namespace {
@@ -31,6 +32,15 @@ VtkDataset legacy_dataset(const std::filesystem::path& path) {
   } catch (const InputError&) {
     return VtkDataset::other;
   }
+}
+
+/// Whether a file of any suffix is a legacy one: SOFA calls its legacy files .vtu.
+bool is_legacy(const std::filesystem::path& path) {
+  constexpr std::string_view kMark = "# vtk DataFile";
+  if (!is_file(path)) return suffix_of(path) == ".vtk";
+  std::string first(kMark.size(), '\0');
+  std::ifstream(path, std::ios::binary).read(first.data(), static_cast<std::streamsize>(first.size()));
+  return suffix_of(path) == ".vtk" || first == kMark;
 }
 
 }  // namespace
@@ -141,7 +151,7 @@ VtkDataset vtk_dataset(const std::filesystem::path& path) {
                                                               {".vtr", VtkDataset::rectilinear_grid},
                                                               {".vtu", VtkDataset::unstructured_grid}};
   const auto found = kSuffixes.find(suffix_of(path));
-  return found == kSuffixes.end() ? legacy_dataset(path) : found->second;
+  return found == kSuffixes.end() || is_legacy(path) ? legacy_dataset(path) : found->second;
 }
 
 bool has_vtk_suffix(const std::filesystem::path& path) {
@@ -151,8 +161,7 @@ bool has_vtk_suffix(const std::filesystem::path& path) {
 
 std::unique_ptr<VtkFile> open_vtk_file(const std::filesystem::path& path) {
   require_readable_file(path);
-  const bool xml = has_vtk_suffix(path) && suffix_of(path) != ".vtk";
-  return xml ? open_vtk_xml(path) : open_vtk_legacy(path);
+  return has_vtk_suffix(path) && !is_legacy(path) ? open_vtk_xml(path) : open_vtk_legacy(path);
 }
 
 std::uint64_t vtk_point_count(const glm::i64vec3& size, const std::string& name) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "deform/errors.h"
 #include "io/mesh_file.h"
@@ -174,6 +175,47 @@ TEST(VtkMesh, TruncatedAtAnyByteIsRefused) {
 }
 
 #ifndef TETWARP_WITH_VTK
+/// A mesh as SOFA's VTKExporter writes it (VTKExporter.cpp): positions alone, edges before tetrahedra, and .vtu in the
+/// name of either form. Points are shifted by x * z.
+std::string sofa(bool xml, int shift) {
+  std::ostringstream points, text;
+  for (const glm::ivec3 p : {glm::ivec3(0), {10, 0, 0}, {0, 10, 0}, {0, 0, 10}, {10, 10, 10}})
+    points << p.x + shift * p.z << " " << p.y << " " << p.z << "\n";
+  if (xml) {
+    text << "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"BigEndian\">\n  <UnstructuredGrid>\n"
+            "    <Piece NumberOfPoints=\"5\" NumberOfCells=\"3\">\n      <Points>\n        <DataArray type=\"Float32\" "
+            "NumberOfComponents=\"3\" format=\"ascii\">\n"
+         << points.str()
+         << "        </DataArray>\n      </Points>\n      <Cells>\n        <DataArray type=\"Int32\" "
+            "Name=\"connectivity\" format=\"ascii\">\n          0 1\n          0 1 2 3\n          1 2 3 4\n"
+            "        </DataArray>\n        <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">\n"
+            "          2 6 10 \n        </DataArray>\n        <DataArray type=\"UInt8\" Name=\"types\" "
+            "format=\"ascii\">\n          3 10 10 \n        </DataArray>\n      </Cells>\n    </Piece>\n"
+            "  </UnstructuredGrid>\n</VTKFile>\n";
+  } else {
+    text << "# vtk DataFile Version 2.0\nExported VTK file\nASCII\n\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n"
+         << points.str() << "\nCELLS 3 13\n2 0 1\n4 0 1 2 3\n4 1 2 3 4\n\nCELL_TYPES 3\n3\n10\n10\n\n";
+  }
+  return text.str();
+}
+
+TEST(VtkMesh, FilesOfSofaAreReadWithTheirDeformedPlaces) {
+  const Scratch scratch;
+  std::vector<bool> forms = {false};
+#ifdef TETWARP_WITH_VTK
+  forms.push_back(true);
+#endif
+  for (const bool xml : forms) {
+    write_file(scratch / "liver0.vtu", sofa(xml, 0));
+    write_file(scratch / "liver1.vtu", sofa(xml, 2));
+    const MeshFile file = read_mesh_file(with(scratch / "liver0.vtu", "deformed=" + (scratch / "liver1.vtu").string()));
+    EXPECT_EQ(file.header.tetrahedra, 2U);
+    ASSERT_EQ(file.mesh.displacement.size(), 5U);
+    EXPECT_EQ(file.mesh.displacement[0], glm::vec3(0));
+    EXPECT_EQ(file.mesh.displacement[4], glm::vec3(20, 0, 0));
+  }
+}
+
 TEST(VtkMesh, XmlFilesAreRefusedWithoutVtk) {
   const Scratch scratch;
   write_file(scratch / "f.vtu", "<VTKFile></VTKFile>");
