@@ -98,7 +98,7 @@ const char* const kFieldHelp =
     ".npy or .npz:order=zyx|xyz,units=mm|voxel[,key=NAME], or .vts .vti .vtr .vtk[:displacement=NAME,frame=lps|ras,"
     "units=mm|m]), a transform of ITK, ANTs, elastix, plastimatch (.h5 .tfm .txt .mat .toml), NiftyReg (its B-spline), "
     "FreeSurfer (.lta) or a 4 x 4 matrix (.mat:tool=greedy|c3d|niftyreg|mrtrix|flirt), each vertex x goes to T(x), an "
-    "affine one with :invert=yes to where the inverse leads, a mesh (.msh .vtu .vtk .frd "
+    "affine one with :invert=yes to where the inverse leads, a mesh (.msh .vtu .vtk .frd .xplt "
     ".inp[:displacement=NAME,step=N|"
     "deformed=FILE|table=FILE], the first of several), or identity, "
     "wave:amplitude=,wavelength=[,phase=,axis=,along=], "

@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/. What the two formats of Abaqus and CalculiX have in common.
+// Private to io/. What the formats of Abaqus, CalculiX and FEBio have in common.
 #include <cstdint>
 #include <map>
 #include <span>
