@@ -7,6 +7,7 @@
 #include "io/dicom_segmentation.h"
 #include "io/dicom_series.h"
 #include "io/dicom_structures.h"
+#include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {
@@ -28,7 +29,7 @@ void derive(const tetwarp::DicomVolume& ct, bool deidentify) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  static const InputFile file(kFuzzSuffix);
   file.fill(data, size);
   if (tetwarp::is_dicom_dose(file.path())) accepted([] { tetwarp::read_dose(file.path()); });
   if (tetwarp::is_dicom_segmentation(file.path()))

@@ -5,11 +5,12 @@
 #include <stdexcept>
 
 #include "apps/batch/manifest_rows.h"
+#include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/input_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace tetwarp::apps;
-  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  static const InputFile file(kFuzzSuffix);
   file.fill(data, size);
   accepted([&] {
     ManifestErrors errors(file.path());

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Mesh files of one suffix: whether it is one, its header, and the whole of it, as it is, as its own deformed mesh, and
-// under each text of TETWARP_FUZZ_OPTIONS.
+// under each text of kFuzzOptions.
 #include "io/mesh_file.h"
+#include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {
@@ -17,11 +18,11 @@ void read_mesh(const std::string& text) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  static const InputFile file(kFuzzSuffix);
   file.fill(data, size);
   asked([] { tetwarp::is_mesh_file(file.path()); });
   read_mesh(file.path().string());
   read_mesh(file.path().string() + ":deformed=" + file.path().string());
-  for (const std::string options : {TETWARP_FUZZ_OPTIONS}) read_mesh(file.path().string() + options);
+  for (const char* const* options = kFuzzOptions; *options; ++options) read_mesh(file.path().string() + *options);
   return 0;
 }

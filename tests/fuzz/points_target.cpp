@@ -5,10 +5,11 @@
 #include <stdexcept>
 
 #include "io/points_file.h"
+#include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/input_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  static const InputFile file(kFuzzSuffix);
   file.fill(data, size);
   for (const auto told : {std::optional<tetwarp::PointFrame>(), {tetwarp::PointFrame::ras}}) {
     accepted([&] {

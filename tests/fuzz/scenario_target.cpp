@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "io/scenario_file.h"
+#include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {
@@ -50,7 +51,7 @@ void prepare(const Scenario& scenario) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  static const InputFile file(kFuzzSuffix);
   file.fill(data, size);
   accepted([&] {
     const Scenario scenario = tetwarp::read_scenario(file.path());

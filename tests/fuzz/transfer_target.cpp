@@ -6,6 +6,7 @@
 
 #include "deform/render/renderer.h"
 #include "io/transfer_file.h"
+#include "tests/fuzz/fuzz_input.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {
@@ -26,7 +27,7 @@ void look_through(const tetwarp::TransferFunction& transfer) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const InputFile file(TETWARP_FUZZ_SUFFIX);
+  static const InputFile file(kFuzzSuffix);
   file.fill(data, size);
   accepted([&] {
     const tetwarp::TransferFunction transfer = tetwarp::read_transfer_file(file.path());
