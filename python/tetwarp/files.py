@@ -201,9 +201,11 @@ def read_field(
     ----------
     path : str or path, or a list of these
         Options stand behind the name, as on the command line: `"field.npy:order=zyx"`. Points go through the first of
-        several, and from there on: `["1Warp.nii.gz", "0GenericAffine.mat"]` as after `antsApplyTransforms -t`.
+        several, and from there on: `["1Warp.nii.gz", "0GenericAffine.mat"]` as after `antsApplyTransforms -t`. Beyond
+        the grid of a first field none of them is applied, so do not resample with `outside="rest"` there.
     like : Volume, image or Geometry, optional
-        The volume that the field is for. Transforms, files without a grid of their own, and several files need it.
+        The volume that the field is for; of a pull field the output grid, on which a transform is sampled and an array
+        lies. Transforms, files without a grid of their own, and several files need it.
     direction : "forward" or "pull"
         "pull": the file leads from the output back to the input. A file that says otherwise is refused.
     cell_size : int, optional
