@@ -15,9 +15,12 @@ import sys
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "python" / "tetwarp"
 
+#: Modules whose functions stand on the page under the module's name.
+MODULES = ("fields", "hdf5", "zarr")
+
 
 def public_names():
-    """The names of `__all__`, and those of the module of formulas."""
+    """The names of `__all__`, and where each is defined."""
     tree = ast.parse((PACKAGE / "__init__.py").read_text())
     homes = {}
     for node in tree.body:
@@ -123,10 +126,10 @@ def main():
     page = ["# tetwarp, the package of Python\n", "The [guide](../guide/python.md) shows how it is used.\n"]
     for name, module in public_names():
         page += described(definition(module, name), name, module)
-    tree = ast.parse((PACKAGE / "fields.py").read_text())
-    for node in tree.body:
-        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
-            page += described(node, f"fields.{node.name}", "fields")
+    for module in MODULES:
+        for node in ast.parse((PACKAGE / f"{module}.py").read_text()).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                page += described(node, f"{module}.{node.name}", module)
     pathlib.Path(sys.argv[1]).write_text("\n".join(page))
 
 

@@ -7,14 +7,14 @@
 #
 #   tests/python_environment.sh PRESET [--peers]
 #
-# --peers also installs the large libraries whose arrays and images are taken (itk, PyTorch, TorchIO, MONAI, JAX), and what
-# executes the notebooks.
+# --peers also installs the large libraries whose arrays and images are taken (itk, PyTorch, TorchIO, MONAI, JAX), those of
+# Zarr and HDF5, and what executes the notebooks.
 # Where there is no Python of 3.10 or later with headers and venv, or no package index, one line says so and the tests are left out.
 set -euo pipefail
 source_dir=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 build=$source_dir/build/$1 environment=$source_dir/build/python-venv
 packages=(nanobind numpy pytest nibabel SimpleITK pydicom mypy playwright axe-playwright-python)
-[ "${2:-}" != --peers ] || packages+=(itk torch torchio monai jax jupytext nbclient ipykernel matplotlib)
+[ "${2:-}" != --peers ] || packages+=(itk torch torchio monai jax zarr h5py ngff-zarr jupytext nbclient ipykernel matplotlib)
 skip() { echo "== no tests of the Python package: $1" >&2; exit 0; }
 python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || skip "python3 is missing or older than 3.10"
 python3 -c 'import os, sysconfig, sys; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' ||

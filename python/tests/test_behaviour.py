@@ -314,7 +314,10 @@ def modules():
 
 @pytest.mark.parametrize("name", list(modules()))
 def test_examples_in_docstrings_do_what_they_say(name):
-    wanted = {"tetwarp.torch": ("torch", "2.4"), "tetwarp.monai": ("monai", "1.2"), "tetwarp.torchio": ("torchio", "0.19")}
+    wanted = {
+        "tetwarp.torch": ("torch", "2.4"), "tetwarp.monai": ("monai", "1.2"), "tetwarp.torchio": ("torchio", "0.19"),
+        "tetwarp.zarr": ("zarr", "2.18"), "tetwarp.hdf5": ("h5py", "3.0"),
+    }  # fmt: skip
     if name in wanted:
         library, version = wanted[name]
         pytest.importorskip(library, minversion=version)
@@ -334,9 +337,10 @@ def test_the_import_loads_no_library_of_others():
     result = run_python(
         """
         import sys
-        import tetwarp
+        import tetwarp, tetwarp.hdf5, tetwarp.zarr
         loaded = {name.split(".")[0] for name in sys.modules}
-        print(sorted(loaded & {"SimpleITK", "itk", "nibabel", "torch", "monai", "torchio", "cupy", "jax", "tqdm"}))
+        others = {"SimpleITK", "itk", "nibabel", "torch", "monai", "torchio", "cupy", "jax", "tqdm", "zarr", "h5py"}
+        print(sorted(loaded & others))
         """
     )
     assert result.stdout == "[]\n", result.stderr

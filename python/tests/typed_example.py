@@ -5,6 +5,8 @@
 
 import numpy as np
 import tetwarp as tw
+import tetwarp.hdf5
+import tetwarp.zarr
 
 ct: tw.Volume = tw.read("study")
 grid: tw.Geometry = ct.geometry
@@ -33,3 +35,7 @@ picture = tw.render(done.volume, transfer="ct-bone", angle=30)
 tw.write(done.volume, "out.nii.gz", compress=1)
 tw.write_field(field, "field.mha")
 status: int = tw.batch("manifest.csv", "out", resume=True)
+stored: tw.Volume = tetwarp.zarr.read("ct.ome.zarr", level=1, index={"t": 0}, space="LPS", unit="micrometer")
+tetwarp.zarr.write(stored, "out.ome.zarr", chunks=(32, 128, 128), levels=3, version="0.4", overwrite=True)
+streamed: tw.Report = tetwarp.zarr.deform("ct.ome.zarr", "out.ome.zarr", field, space="LPS", outside="background")
+plain: tw.Volume = tetwarp.hdf5.read("case.h5", dataset="image", geometry=grid, order="ijk")

@@ -31,19 +31,23 @@ class _Bar:
             self._bar.close()
 
 
+def shown(progress: Progress, title: str) -> Callable[[float], object] | None:
+    """What gets the share that is done: of True tqdm's bar, where tqdm is installed."""
+    if callable(progress):
+        return progress
+    if progress is True:
+        try:
+            return _Bar(title)
+        except ImportError:
+            return None
+    if progress is not False:
+        raise TypeError(f"progress is {progress!r}; expected True, False or a callable")
+    return None
+
+
 def options(progress: Progress, title: str, stream: int = 0) -> _core.CallOptions:
     """What the binding is given for one call."""
-    callable_: Any = None
-    if callable(progress):
-        callable_ = progress
-    elif progress is True:
-        try:
-            callable_ = _Bar(title)
-        except ImportError:
-            callable_ = None
-    elif progress is not False:
-        raise TypeError(f"progress is {progress!r}; expected True, False or a callable")
-    return _core.CallOptions(callable_, stream)
+    return _core.CallOptions(shown(progress, title), stream)
 
 
 def threads(wished: int) -> int:

@@ -79,6 +79,18 @@ def _grid_of(grid: Any, volume: Volume, field: VertexField | None, outside: str)
     return adapters.volume_of(grid, name="grid")[0].geometry.straightened()
 
 
+def _notes_of(grid: Any, output: Geometry, volume: Volume) -> list[str]:
+    """Remarks about a volume, and the grid onto which it was resampled."""
+    notes = list(volume.notes)
+    if isinstance(grid, str) and grid == "same" and output != volume.geometry:
+        notes.insert(
+            0,
+            f"the volume's slices lean or lie at uneven distances: the output has a straight, even grid of "
+            f"{' x '.join(map(str, output.size))} voxels, so that the identity resamples too",
+        )
+    return notes
+
+
 def deform(
     volume: Any,
     field: VertexField | None = None,
@@ -206,12 +218,7 @@ def deform(
     if given.series is not None:
         result.derivation = _derivation(origin, main, outside, preserve)
     report.copies = copies
-    if isinstance(grid, str) and grid == "same" and output != given.geometry:
-        report.notes.append(
-            f"the volume's slices lean or lie at uneven distances: the output has a straight, even grid of "
-            f"{' x '.join(map(str, output.size))} voxels, so that the identity resamples too"
-        )
-    report.notes += given.notes
+    report.notes += _notes_of(grid, output, given)
     done = Deformed(back(result), made, report, gone_along)
     if points is not None and field is not None:
         done.points, done.inside = move_points(points, field, output, outside=beyond, threads=threads)
