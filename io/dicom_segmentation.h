@@ -24,9 +24,11 @@ struct DicomSegmentation {
     std::size_t segment = 0;  ///< index into `segments`
     std::int64_t slice = 0;   ///< index k in `geometry`
   };
-  /// Grid of all frames, with one empty slice before and one after them. A frame that is missing is empty.
+  /// Grid of all frames, with one empty slice before and one after them, and an empty row or column where the volume
+  /// reaches beyond them. A frame that is missing is empty.
   Geometry geometry;
-  bool fractional = false;  ///< whether Segmentation Type (0062,0001) is FRACTIONAL, not BINARY
+  glm::i64vec3 first{0}, last{0};  ///< voxels of `geometry` that frames show, or would
+  bool fractional = false;         ///< whether Segmentation Type (0062,0001) is FRACTIONAL, not BINARY
   /// Value of a voxel that belongs wholly to a segment: Maximum Fractional Value (0062,000E), or 1 for BINARY.
   int largest = 1;
   std::vector<Segment> segments;       ///< in the order of the file
@@ -42,9 +44,12 @@ bool is_dicom_segmentation(const std::filesystem::path& path);
 /// where the frames lie on such a grid, else as far as the two closest frames.
 /// @param path          file to read
 /// @param otherwise_mm  mm; 0: unknown
+/// @param volume        grid of the volume that it goes with; null: unknown. Frames that were cropped are empty beyond
+///         their border where it goes on.
 /// @throws InputError for a number of bits that does not fit Segmentation Type, frames that lie on no even grid or
 ///         occur twice, or segments that are not described
-DicomSegmentation read_segmentation_header(const std::filesystem::path& path, double otherwise_mm = 0);
+DicomSegmentation read_segmentation_header(const std::filesystem::path& path, double otherwise_mm = 0,
+                                           const Geometry* volume = nullptr);
 
 /// Reads the pixels: one uint8 volume for each segment, with values 0 to `DicomSegmentation::largest`. Segments may
 /// overlap.

@@ -18,6 +18,7 @@ struct Structure {
   int number = 0;                      ///< ROI Number (3006,0022)
   std::string frame_of_reference_uid;  ///< Referenced Frame of Reference UID (3006,0024)
   std::vector<Contour> contours;       ///< in the order of the file; `Contour::slice` is not set
+  std::size_t repeated = 0;            ///< closed contours that the file has twice and that are taken once
 };
 
 /// What a structure set contains beside contours. The type hides DCMTK.

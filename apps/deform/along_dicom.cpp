@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
 #include "io/shown_text.h"
@@ -18,21 +18,22 @@ DicomSegmentation open_segmentation(const AlongVolumeChoice& choice, const Input
     throw UsageError("a SEG comes out as a SEG, " + name + "; name the output of --with .dcm");
   if (choice.background)
     throw UsageError("background= is not for a SEG, which is empty where nothing maps, " + name + "; leave it out");
-  return read_segmentation_header(choice.input.path, input.geometry.spacing.z);
+  return read_segmentation_header(choice.input.path, input.geometry.spacing.z, &input.geometry);
 }
 
 Geometry own_grid(const DicomSegmentation& segmentation, const Geometry& input) {
-  constexpr double kParallel = 1e-4, kSlice = 1e-3;
+  constexpr double kRounding = 1e-3;  // of a voxel
   Geometry grid = segmentation.geometry;
-  std::int64_t first = 1, last = grid.size.z - 2;  // without the empty ones
+  glm::dvec3 low(segmentation.first), high(segmentation.last);
   const AffineMap index = index_from_point(grid), point = point_from_index(input);
-  const double a = index(point(glm::dvec3(0))).z, b = index(point(glm::dvec3(0, 0, input.size.z - 1))).z;
-  if (std::abs(glm::dot(grid.direction[2], glm::cross(input.direction[0], input.direction[1]))) > 1 - kParallel) {
-    first = std::min<std::int64_t>(first, std::llround(std::ceil(std::min(a, b) - kSlice)));
-    last = std::max<std::int64_t>(last, std::llround(std::floor(std::max(a, b) + kSlice)));
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 side(corner & 1, corner >> 1 & 1, corner >> 2);
+    const glm::dvec3 at = index(point(side * glm::dvec3(input.size - std::int64_t{1})));
+    low = glm::min(low, glm::ceil(at - kRounding));
+    high = glm::max(high, glm::floor(at + kRounding));
   }
-  grid.origin = point_from_index(grid)(glm::dvec3(0, 0, static_cast<double>(first)));
-  grid.size.z = last - first + 1;
+  grid.origin = point_from_index(grid)(low);
+  grid.size = glm::i64vec3(high - low) + std::int64_t{1};
   return grid;
 }
 

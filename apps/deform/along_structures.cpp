@@ -226,6 +226,9 @@ void add_notes(const MovedRoi& roi, const Structure& structure, const std::files
   if (!roi.problem.empty()) notes.push_back(name + " is left empty: " + roi.problem);
   if (roi.left_out > 0)
     notes.push_back(std::to_string(roi.left_out) + of + " are left out: the field does not say where they go");
+  if (structure.repeated > 0)
+    notes.push_back(std::to_string(structure.repeated) + " contours of " + name +
+                    " are there twice and are taken once");
   if (roi.beyond > 0) notes.push_back(std::to_string(roi.beyond) + of + " come to lie beyond the output");
   if (roi.cut) notes.push_back(name + " is cut off where the output ends or the field maps nothing");
   if (roi.at_end)

@@ -92,11 +92,13 @@ bool contains(std::span<const glm::dvec2> ring, const glm::dvec2& point) {
 
 double nested_area(const std::vector<Ring>& rings) {
   double area = 0;
-  for (const Ring& ring : rings) {
-    if (ring.empty()) continue;
-    const auto around = std::count_if(rings.begin(), rings.end(), [&](const Ring& other) {
-      return &other != &ring && contains(other, ring.front());
-    });
+  for (auto at = rings.begin(); at != rings.end(); ++at) {
+    const Ring& ring = *at;
+    // Equal rings cancel each other in pairs: of an odd number the first counts.
+    const bool counted = std::find(rings.begin(), at, ring) == at && std::count(at, rings.end(), ring) % 2 == 1;
+    if (ring.empty() || !counted) continue;
+    const auto around = std::count_if(
+        rings.begin(), rings.end(), [&](const Ring& other) { return other != ring && contains(other, ring.front()); });
     area += (around % 2 == 0 ? 1 : -1) * std::abs(signed_area(ring));
   }
   return area;

@@ -75,7 +75,7 @@ DoseReport write_derived_dose(const std::filesystem::path&, const ConstVolumeVie
 
 bool is_dicom_segmentation(const std::filesystem::path&) { return false; }
 
-DicomSegmentation read_segmentation_header(const std::filesystem::path&, double) { refuse(); }
+DicomSegmentation read_segmentation_header(const std::filesystem::path&, double, const Geometry*) { refuse(); }
 
 std::vector<AnyVolume> read_segments(const std::filesystem::path&, const DicomSegmentation&) { refuse(); }
 

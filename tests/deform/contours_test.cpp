@@ -108,6 +108,11 @@ TEST(Keyholes, EachRingAloneIsRight) {
     }
   }
   EXPECT_NEAR(nested_area(joined), nested_area(before), 1e-9);
+  // By exclusive or equal rings cancel each other, and what they contain stays.
+  const Ring outer = circle({0, 0}, 20, 80), inner = circle({0, 0}, 5, 80);
+  EXPECT_EQ(nested_area({outer, outer}), 0);
+  EXPECT_EQ(nested_area({outer, outer, outer}), nested_area({outer}));
+  EXPECT_NEAR(nested_area({outer, inner, outer}), nested_area({inner}), 1e-9);
 }
 
 TEST(Simplified, LeavesWhatIsWithinTheTolerance) {

@@ -26,6 +26,7 @@ namespace {
 
 constexpr std::int64_t kMostSlices = 2500;
 constexpr std::size_t kMostFrames = 1'000'000, kMostSegments = 65535;
+constexpr const char* kLabelMap = "1.2.840.10008.5.1.4.1.1.66.7";  // Label Map Segmentation Storage
 
 bool agree(const std::vector<double>& a, const std::vector<double>& b, double tolerance) {
   return std::ranges::equal(a, b, [=](double x, double y) { return std::abs(x - y) <= tolerance; });
@@ -38,10 +39,12 @@ class SegmentationFile {
     prepare_dcmtk();
     const OFCondition read = parse_dicom(format_, path, DCM_UndefinedTagKey).result;
     if (read.bad()) refuse(std::string("cannot be read as DICOM: ") + read.text());
-    if (text_of(data(), DCM_SOPClassUID) != UID_SegmentationStorage) refuse("is no DICOM segmentation");
+    const std::string sop_class = text_of(data(), DCM_SOPClassUID);
+    if (sop_class == kLabelMap) refuse("is a LABELMAP, of which no segment is read; write it as BINARY");
+    if (sop_class != UID_SegmentationStorage) refuse("is no DICOM segmentation");
   }
 
-  DicomSegmentation header(double otherwise_mm);
+  DicomSegmentation header(double otherwise_mm, const Geometry* volume);
   std::vector<AnyVolume> segments(const DicomSegmentation& header);
 
  private:
@@ -56,6 +59,7 @@ class SegmentationFile {
   void read_segment_list(DicomSegmentation& seg);
   void read_plane(DicomSegmentation& seg);
   void place_frames(DicomSegmentation& seg, double otherwise_mm);
+  static void pad_cropped(DicomSegmentation& seg, const Geometry& volume);
   void require_dense(const DicomSegmentation& seg);
   double slice_distance(const std::vector<double>& places, double otherwise_mm);
   std::span<const Uint8> pixels(std::size_t expected);
@@ -225,6 +229,29 @@ void SegmentationFile::place_frames(DicomSegmentation& seg, double otherwise_mm)
   }
 }
 
+/// Adds an empty row or column at each border of the frames beyond which a volume goes on.
+void SegmentationFile::pad_cropped(DicomSegmentation& seg, const Geometry& volume) {
+  constexpr double kBorder = 0.5, kRounding = 1e-3;  // of a voxel
+  const AffineMap index = index_from_point(seg.geometry), point = point_from_index(volume);
+  for (int axis = 0; axis < 2; ++axis) {
+    double low = 0, high = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 side(corner & 1, corner >> 1 & 1, corner >> 2);
+      const double at = index(point(side * glm::dvec3(volume.size - std::int64_t{1})))[axis];
+      low = corner == 0 ? at : std::min(low, at);
+      high = corner == 0 ? at : std::max(high, at);
+    }
+    const std::int64_t before = low < -kBorder - kRounding ? 1 : 0,
+                       after = high > static_cast<double>(seg.last[axis]) + kBorder + kRounding ? 1 : 0;
+    glm::dvec3 corner(0);
+    corner[axis] = static_cast<double>(-before);
+    seg.geometry.origin = point_from_index(seg.geometry)(corner);
+    seg.geometry.size[axis] += before + after;
+    seg.first[axis] += before;
+    seg.last[axis] += before;
+  }
+}
+
 /// A few frames far apart, and segments without any, can stand for far more memory than the file takes.
 void SegmentationFile::require_dense(const DicomSegmentation& seg) {
   constexpr double kMost = 10'000;
@@ -235,7 +262,7 @@ void SegmentationFile::require_dense(const DicomSegmentation& seg) {
            std::to_string(seg.geometry.size.z) + " slices: read, it takes more than 10000 times its pixels");
 }
 
-DicomSegmentation SegmentationFile::header(double otherwise_mm) {
+DicomSegmentation SegmentationFile::header(double otherwise_mm, const Geometry* volume) {
   DicomSegmentation seg;
   seg.frame_of_reference_uid = text_of(data(), DCM_FrameOfReferenceUID);
   read_bits(seg);
@@ -248,6 +275,9 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm) {
            ", and functional groups of " + std::to_string(frames_.size()));
   read_plane(seg);
   place_frames(seg, otherwise_mm);
+  seg.first = {0, 0, 1};
+  seg.last = seg.geometry.size - std::int64_t{1} - seg.first;
+  if (volume) pad_cropped(seg, *volume);
   require_dense(seg);
   return seg;
 }
@@ -263,8 +293,8 @@ std::span<const Uint8> SegmentationFile::pixels(std::size_t expected) {
 }
 
 std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& header) {
-  const glm::i64vec3 size = header.geometry.size;
-  const auto plane = static_cast<std::size_t>(size.x * size.y), count = plane * header.frames.size();
+  const glm::i64vec3 size = header.geometry.size, shown = header.last - header.first + std::int64_t{1};
+  const auto plane = static_cast<std::size_t>(shown.x * shown.y), count = plane * header.frames.size();
   const std::span<const Uint8> stored = pixels(header.fractional ? count : (count + 7) / 8);
   std::vector<AnyVolume> volumes;
   for (std::size_t n = 0; n < header.segments.size(); ++n) {
@@ -273,12 +303,16 @@ std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& heade
   }
   for (std::size_t n = 0; n < header.frames.size(); ++n) {
     const auto& [segment, slice] = header.frames[n];
-    const auto to = volumes[segment].as<std::uint8_t>().subspan(static_cast<std::size_t>(slice) * plane, plane);
+    const std::int64_t corner = header.first.x + size.x * (header.first.y + size.y * slice);
+    const auto to = volumes[segment].as<std::uint8_t>().subspan(static_cast<std::size_t>(corner));
     for (std::size_t pixel = 0; pixel < plane; ++pixel) {
       const std::size_t at = n * plane + pixel;  // bits follow one another through all frames, the lowest first
-      to[pixel] = header.fractional ? stored[at] : static_cast<std::uint8_t>(stored[at / 8] >> (at % 8) & 1);
-      if (to[pixel] > header.largest)
-        refuse("has the value " + std::to_string(to[pixel]) + " in frame " + std::to_string(n + 1) + ", above " +
+      const std::size_t row = pixel / static_cast<std::size_t>(shown.x),
+                        column = pixel % static_cast<std::size_t>(shown.x);
+      std::uint8_t& value = to[row * static_cast<std::size_t>(size.x) + column];
+      value = header.fractional ? stored[at] : static_cast<std::uint8_t>(stored[at / 8] >> (at % 8) & 1);
+      if (value > header.largest)
+        refuse("has the value " + std::to_string(value) + " in frame " + std::to_string(n + 1) + ", above " +
                tag_name(DCM_MaximumFractionalValue) + " " + std::to_string(header.largest));
     }
   }
@@ -287,10 +321,14 @@ std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& heade
 
 }  // namespace
 
-bool is_dicom_segmentation(const std::filesystem::path& path) { return sop_class_of(path) == UID_SegmentationStorage; }
+bool is_dicom_segmentation(const std::filesystem::path& path) {
+  const std::string sop_class = sop_class_of(path);
+  return sop_class == UID_SegmentationStorage || sop_class == kLabelMap;
+}
 
-DicomSegmentation read_segmentation_header(const std::filesystem::path& path, double otherwise_mm) {
-  return SegmentationFile(path).header(otherwise_mm);
+DicomSegmentation read_segmentation_header(const std::filesystem::path& path, double otherwise_mm,
+                                           const Geometry* volume) {
+  return SegmentationFile(path).header(otherwise_mm, volume);
 }
 
 std::vector<AnyVolume> read_segments(const std::filesystem::path& path, const DicomSegmentation& header) {

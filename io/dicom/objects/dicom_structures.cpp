@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
+#include <tuple>
 
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/objects/dicom_along_put.h"
@@ -55,7 +57,9 @@ class StructureFile {
       const auto place = places.find(number);
       if (place == places.end()) refuse("has contours of " + name(number) + ", which it does not define");
       if (header->contour[place->second]) refuse("has contours of " + name(number) + " at two places");
-      set.structures[place->second].contours = contours(*item, number);
+      Structure& structure = set.structures[place->second];
+      structure.contours = contours(*item, number);
+      structure.repeated = drop_repeated(structure.contours);
       drop(*item, DCM_ContourSequence);
       header->contour[place->second].reset(new DcmItem(*item));
     }
@@ -104,6 +108,20 @@ class StructureFile {
       result.push_back(contour(*item, where));
     }
     return result;
+  }
+
+  /// Drops closed contours that are there twice: as a region and a hole of it they would leave nothing.
+  /// @return how many were dropped
+  static std::size_t drop_repeated(std::vector<Contour>& contours) {
+    const auto less = [](const std::vector<glm::dvec3>& a, const std::vector<glm::dvec3>& b) {
+      return std::lexicographical_compare(
+          a.begin(), a.end(), b.begin(), b.end(),
+          [](const glm::dvec3& p, const glm::dvec3& q) { return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z); });
+    };
+    std::set<std::vector<glm::dvec3>, decltype(less)> seen(less);
+    return std::erase_if(contours, [&](const Contour& contour) {
+      return contour.kind == ContourKind::closed && !seen.insert(contour.points).second;
+    });
   }
 
   Contour contour(DcmItem& item, const std::string& where) const {

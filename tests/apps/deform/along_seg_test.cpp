@@ -107,6 +107,27 @@ TEST(SegAlong, OnItsOwnGridItReachesAsFarAsTheSeries) {
                   [](int n, int i, int j, int k) { return i > 3 + n && j > 4 && k > 0 ? 1 : 0; });
 }
 
+/// Frames cropped to a part of the slice: they are empty beyond it, and what moves out of it is not lost.
+TEST(SegAlong, FramesThatWereCroppedGiveWhatWholeOnesGive) {
+  const AlongCase kase;
+  MadeSeg whole = AlongCase::seg();
+  whole.value = [](int n, int i, int j, int k) { return i > 3 + n && i < 7 && j > 2 && j < 6 && k > 0 ? 1 : 0; };
+  whole.write(kase.scratch / "whole.dcm");
+  MadeSeg cropped = whole;
+  cropped.columns = 3;
+  cropped.rows = 3;
+  cropped.origin += glm::dvec3(4, 3, 0) * cropped.spacing;
+  cropped.value = [whole](int n, int i, int j, int k) { return whole.value(n, i + 4, j + 3, k); };
+  cropped.write(kase.scratch / "cropped.dcm");
+  for (const std::string own : {"", ":own"}) {
+    kase.run("deform ct" + std::string(kTwist) + "-o out --overwrite --with whole.dcm=a.dcm" + own +
+             " --with cropped.dcm=b.dcm" + own);
+    const ReadSeg a(kase.scratch / "a.dcm");
+    expect_segments(kase.scratch / "b.dcm",
+                    [&](int n, int i, int j, int k) { return a.at(static_cast<std::size_t>(n), i, j, k); });
+  }
+}
+
 TEST(SegAlong, EachSegmentIsWhatItsMaskBecomesVoxelByVoxelForPydicomToo) {
   const AlongCase kase;
   const MadeSeg binary = AlongCase::seg(), fractional = AlongCase::fractions();

@@ -50,6 +50,19 @@ TEST(Structures, AreReadAsTheyLieInTheFile) {
   EXPECT_TRUE(set.structures[2].contours.empty());
 }
 
+TEST(Structures, AClosedContourThatIsThereTwiceIsTakenOnce) {
+  const Scratch scratch;
+  MadeStructures made = two_rois();
+  auto& contours = made.rois[0];
+  contours.push_back(contours[0]);
+  contours.push_back(contours[1]);  // a point is no area: both stay
+  write_structures(scratch / "rs.dcm", made);
+  const StructureSet set = read_structure_set(scratch / "rs.dcm");
+  EXPECT_EQ(set.structures[0].contours.size(), 3u);
+  EXPECT_EQ(set.structures[0].repeated, 1u);
+  EXPECT_EQ(set.structures[1].repeated, 0u);
+}
+
 TEST(Structures, OtherFilesAreNone) {
   const Scratch scratch;
   MadeStructures made = two_rois();
