@@ -94,18 +94,17 @@ CLI::Validator size_in_bytes() {
 
 const char* const kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 const char* const kFieldHelp =
-    "Forward field: a file (.mha .nrrd .mgz .nii .nii.gz[:values=displacements|positions,frame=lps|ras,source=MOVING], "
-    ".npy or .npz:order=zyx|xyz,units=mm|voxel[,key=NAME], or .vts .vti .vtr .vtk[:displacement=NAME,frame=lps|ras,"
-    "units=mm|m]), a transform of ITK, ANTs, elastix, plastimatch (.h5 .tfm .txt .mat .toml), NiftyReg (its B-spline), "
-    "FreeSurfer (.lta) or a 4 x 4 matrix (.mat:tool=greedy|c3d|niftyreg|mrtrix|flirt), each vertex x goes to T(x), an "
-    "affine one with :invert=yes to where the inverse leads, a mesh (.msh .vtu .vtk .frd .xplt "
-    ".inp[:displacement=NAME,step=N|"
-    "deformed=FILE|table=FILE], the first of several), or identity, "
-    "wave:amplitude=,wavelength=[,phase=,axis=,along=], "
+    "Forward field: a file (.mha .nrrd .mgz .nii .nii.gz, of which some need values=displacements|positions and "
+    "frame=lps|ras, those of FSL source=MOVING; .npy or .npz:order=zyx|xyz,units=mm|voxel, with key=NAME; .vts .vti "
+    ".vtr "
+    ".vtk[:displacement=NAME,frame=lps|ras,units=mm|m]), a transform of ITK, ANTs, elastix, plastimatch (.h5 .tfm .txt "
+    ".mat .toml), NiftyReg and FSL (their B-splines), FreeSurfer (.lta) or a 4 x 4 matrix "
+    "(.mat:tool=greedy|c3d|niftyreg|mrtrix|flirt), each vertex x goes to T(x), an affine one with invert=yes to where "
+    "the inverse leads, a mesh (.msh .vtu .vtk .frd .xplt .inp, with displacement=NAME and step=N, deformed=FILE, or "
+    "table=FILE; the first of several), or identity, wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], "
-    "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; "
-    "mm, "
-    "or voxels with the suffix vox; degrees. Several compose, the first is applied first";
+    "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; mm, or voxels with the suffix vox; degrees. Options stand "
+    "behind a name as after .npy. Several compose, the first is applied first";
 
 void add_common(CLI::App& command, CommonOptions& common, bool writes) {
   command.add_option("--threads", common.threads, "Threads; 0 is all")
