@@ -46,6 +46,9 @@ for python in ${pythons[@]+"${pythons[@]}"}; do command -v "$python" >/dev/null 
 for program in doxygen sphinx-build dpkg-shlibdeps lintian xz; do
   command -v $program >/dev/null || fail "$program is not installed; docs/guide/release.md names the packages"
 done
+# Before anything is built, since the bill of materials comes last.
+read -ra needed <<<"$(examples/quickstart.sh --packages | tr ' ' '\n' | grep '^lib.*-dev$' | tr '\n' ' ')"
+cmake/release/sbom.py --check "${needed[@]}"
 commit=$(git rev-parse HEAD)
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct "$commit")
 export SOURCE_DATE_EPOCH

@@ -5,6 +5,7 @@
 """Writes the bill of materials of a release to standard output: SPDX 2.3 as JSON.
 
     cmake/release/sbom.py SOURCE FOLDER
+    cmake/release/sbom.py --check PACKAGE...    whether the licences of packages of Debian are known; nothing is written
 
 SOURCE: a folder in which cmake/debian/build.sh and python/wheels.sh were run. FOLDER: with the files of the release.
 Nothing is listed by hand but licences: what is compiled with is every file outside of SOURCE that the compiler read (the
@@ -27,9 +28,9 @@ import zipfile
 LICENCES = {
     "boost": "BSL-1.0", "boost-defaults": "BSL-1.0", "cli11": "BSD-3-Clause", "dcmtk": "BSD-3-Clause AND IJG",
     "eigen3": "MPL-2.0", "fftw3": "GPL-2.0-or-later", "gcc": "GPL-3.0-or-later WITH GCC-exception-3.1", "glibc": "LGPL-2.1-or-later",
-    "glm": "MIT", "hdf5": "BSD-3-Clause", "highway": "Apache-2.0", "icu": "ICU",
+    "glm": "MIT", "googletest": "BSD-3-Clause", "hdf5": "BSD-3-Clause", "highway": "Apache-2.0", "icu": "ICU",
     "insighttoolkit": "Apache-2.0 AND GPL-2.0-or-later", "libaec": "BSD-2-Clause", "libdeflate": "MIT", "libjpeg-turbo": "IJG AND BSD-3-Clause AND Zlib",
-    "libpng": "Libpng", "libxml": "MIT", "linux": "GPL-2.0-only WITH Linux-syscall-note", "nlohmann-json": "MIT", "numpy": "BSD-3-Clause", "onetbb": "Apache-2.0",
+    "libpng": "Libpng", "libxml": "MIT", "minizip": "Zlib", "linux": "GPL-2.0-only WITH Linux-syscall-note", "nlohmann-json": "MIT", "numpy": "BSD-3-Clause", "onetbb": "Apache-2.0",
     "openjpeg": "BSD-2-Clause", "openssl": "Apache-2.0", "tomlplusplus": "MIT", "python": "PSF-2.0", "python3-defaults": "PSF-2.0",
     "vtk": "BSD-3-Clause", "xz-utils": "LicenseRef-public-domain", "zlib": "Zlib",
 }
@@ -176,6 +177,11 @@ def package_of_library(soname):
 
 
 def main():
+    if sys.argv[1:2] == ["--check"]:
+        checked = Document("")
+        for package in sys.argv[2:]:
+            checked.debian(package)
+        return
     if len(sys.argv) != 3:
         raise SystemExit(__doc__.split("\n\n")[1].strip())
     source, folder = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
