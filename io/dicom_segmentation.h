@@ -27,8 +27,9 @@ struct DicomSegmentation {
   /// Grid of all frames, with one empty slice before and one after them, and an empty row or column where the volume
   /// reaches beyond them. A frame that is missing is empty.
   Geometry geometry;
-  glm::i64vec3 first{0}, last{0};  ///< voxels of `geometry` that frames show, or would
-  bool fractional = false;         ///< whether Segmentation Type (0062,0001) is FRACTIONAL, not BINARY
+  glm::i64vec3 first{0};    ///< first voxel of `geometry` that frames show, or would
+  glm::i64vec3 last{0};     ///< the last one
+  bool fractional = false;  ///< whether Segmentation Type (0062,0001) is FRACTIONAL, not BINARY
   /// Value of a voxel that belongs wholly to a segment: Maximum Fractional Value (0062,000E), or 1 for BINARY.
   int largest = 1;
   std::vector<Segment> segments;       ///< in the order of the file
