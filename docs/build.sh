@@ -5,11 +5,17 @@
 # Builds the documents as a site, build/docs/html/index.html, with the interface of the installed headers. Nothing is
 # fetched; docs/guide/install.md names the Debian packages. A warning of Doxygen or Sphinx is an error.
 #
-#   docs/build.sh
+#   docs/build.sh [--headers]
+#
+# --headers: only looks whether Doxygen understands the headers; exit status 77 where it is not installed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-out=build/docs
-for program in doxygen sphinx-build; do
+out=build/docs headers_only=no
+[ "${1:-}" != --headers ] || headers_only=yes
+[ $headers_only = no ] || command -v doxygen > /dev/null || { echo "doxygen is not installed"; exit 77; }
+needed=(doxygen sphinx-build)
+[ $headers_only = no ] || needed=(doxygen)
+for program in "${needed[@]}"; do
   command -v "$program" > /dev/null ||
     { echo "docs/build.sh: error: $program is not installed; docs/guide/install.md names the packages" >&2; exit 1; }
 done
@@ -32,5 +38,6 @@ if [ "$doxygen" -ne 0 ]; then
   exit 1
 fi
 
+[ $headers_only = no ] || exit 0
 sphinx-build -b html -q -W --keep-going -c docs -d "$out/doctrees" "$out/source" "$out/html"
 echo "$out/html/index.html"
