@@ -22,11 +22,11 @@ class Tetwarp(CMakePackage, CudaPackage):
     tetrahedron that owns it came from."""
 
     manual_download = True
-    url = f"file://{os.getcwd()}/tetwarp-0.2.0.tar.xz"
+    url = f"file://{os.getcwd()}/tetwarp-0.3.0.tar.xz"
 
     license("Apache-2.0")
 
-    version("0.2.0")
+    version("0.3.0")
 
     variant("dcmtk", default=True, description="DICOM series in and out")
     variant("openjpeg", default=True, when="+dcmtk", description="JPEG 2000 in DICOM")
