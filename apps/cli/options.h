@@ -180,11 +180,11 @@ struct TruthOptions {
 
 struct ScoreOptions {
   CommonOptions common;
-  std::filesystem::path set;                   ///< folder of a set of known truth
-  std::vector<std::filesystem::path> results;  ///< folders, or one file for a set of one case
-  bool forward = false;                        ///< results lead from moving to fixed
-  std::vector<std::filesystem::path> back;     ///< results of the other direction, as many as results, or none
-  std::filesystem::path triples;               ///< folder of results between two fixed volumes
+  std::filesystem::path set;         ///< folder of a set of known truth
+  std::vector<std::string> results;  ///< folders, or one file for a set of one case, with options behind
+  bool forward = false;              ///< results lead from moving to fixed
+  std::vector<std::string> back;     ///< results of the other direction, as many as results, or none
+  std::string triples;               ///< folder of results between two fixed volumes
   std::filesystem::path limits, json, csv, html;
   BackendChoice backend = BackendChoice::automatic;
   int device = 0;  ///< of CUDA

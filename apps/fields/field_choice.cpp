@@ -128,6 +128,15 @@ std::string title_without_names(const FieldChoice& field) {
   });
 }
 
+std::string text_of(const FieldSource& source) {
+  std::string text = source.path.string(), before = ":";
+  for (const auto& [key, value] : source.options) {
+    text.append(before).append(key).append("=").append(value);
+    before = ",";
+  }
+  return text;
+}
+
 FieldSource parse_field_file(const std::string& text, NiftiFrame frame) {
   return *file_of(parse_named_file(text, frame));
 }
@@ -188,10 +197,7 @@ std::string with_files_renamed(const std::string& text, const std::function<std:
     has_files = true;
   }
   if (!has_files) return other;
-  std::string all = source.path.string();
-  for (const auto& [key, value] : source.options)
-    all.append(all.size() == source.path.string().size() ? ":" : ",").append(key).append("=").append(value);
-  return all;
+  return text_of(source);
 }
 
 }  // namespace tetwarp::apps

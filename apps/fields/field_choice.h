@@ -75,6 +75,9 @@ std::string title_of(const FieldChoice& field);
 /// Title for a de-identified volume: formulas, and that there was a file, but not its name; "deformed" of a pull field.
 std::string title_without_names(const FieldChoice& field);
 
+/// A file with the options behind its name as one text: what `parse_field_source` parses.
+std::string text_of(const FieldSource& source);
+
 /// A file with the options behind its name, `PATH` or `PATH:KEY=VALUE,...`: a field, or whatever else `info` is given.
 /// It need not exist. @throws UsageError for options that do not go with it
 FieldSource parse_field_file(const std::string& text, NiftiFrame frame);

@@ -26,25 +26,28 @@ constexpr const char* kSuffixes[] = {".mha", ".mhd",  ".nrrd", ".nhdr", ".nii", 
                                      ".txt", ".toml", ".mat",  ".lta",  ".mgz", ".mgh",    ".npy",     ".npz",  ".vts",
                                      ".vti", ".vtr",  ".vtk",  ".dcm",  ".csv", ".fcsv",   ".mrk.json"};
 
-/// The file in a folder whose name is `name` and a suffix; empty: there is none. @throws InputError for several
-fs::path result_in(const fs::path& folder, const std::string& name) {
-  fs::path found;
+/// The file in a folder whose name is `name` and a suffix, with the options of the folder; none: there is no such file.
+/// @throws InputError for several
+std::optional<FieldSource> result_in(const FieldSource& folder, const std::string& name) {
+  std::optional<FieldSource> found;
   for (const char* suffix : kSuffixes) {
-    const fs::path file = folder / (name + suffix);
+    const fs::path file = folder.path / (name + suffix);
     if (!fs::exists(file)) continue;
-    require(found.empty(), folder.string() + " holds several results of " + name + ", " + found.filename().string() +
-                               " and " + file.filename().string() + "; keep one");
-    found = file;
+    require(!found, folder.path.string() + " holds several results of " + name + ", " +
+                        (found ? found->path.filename().string() : "") + " and " + file.filename().string() +
+                        "; keep one");
+    found = folder;
+    found->path = file;
   }
   return found;
 }
 
 /// The result of a case: that in a folder, or a file itself. @throws InputError for several, or a file for many cases
-fs::path result_of(const fs::path& results, const TruthSet& set, const TruthCase& one) {
-  if (fs::is_directory(results)) return result_in(results, one.name);
-  require(fs::exists(results), "the result " + results.string() + " is not there");
-  require(set.cases.size() == 1, results.string() + " is a file, but the set has " + std::to_string(set.cases.size()) +
-                                     " cases; give a folder with a result of each");
+std::optional<FieldSource> result_of(const FieldSource& results, const TruthSet& set, const TruthCase& one) {
+  if (fs::is_directory(results.path)) return result_in(results, one.name);
+  require(fs::exists(results.path), "the result " + results.path.string() + " is not there");
+  require(set.cases.size() == 1, results.path.string() + " is a file, but the set has " +
+                                     std::to_string(set.cases.size()) + " cases; give a folder with a result of each");
   return results;
 }
 
@@ -83,18 +86,20 @@ CaseScorer::CaseScorer(const ScoreOptions& options, TruthSet set)
   moving_ = read_volumes(set_.moving, set_.labels);
 }
 
-CaseScore CaseScorer::score(const fs::path& results, const fs::path& back, const TruthCase& one,
+CaseScore CaseScorer::score(const FieldSource& results, const FieldSource* back, const TruthCase& one,
                             const std::vector<ScoreLimit>& limits) const {
   CaseScore score;
-  score.result = results.string();
+  score.result = text_of(results);
   score.name = one.name;
   score.roles = set_.roles;
   const glm::dvec3& sides = moving_.ct->geometry().spacing;
   score.voxel_side_mm = std::max({sides.x, sides.y, sides.z});
   try {
-    score.file = result_of(results, set_, one);
-    if (score.file.empty()) return score;
+    const auto result = result_of(results, set_, one);
+    if (!result) return score;
+    score.file = result->path;
     if (!points_suffix(score.file).empty() && score.file.extension() != ".vtk") {
+      require(result->options.empty(), score.file.string() + " holds points, which take no options");
       score_points(one, score);
     } else {
       score_field(results, back, one, score);
@@ -137,9 +142,9 @@ PullField CaseScorer::sampled(PullField field, const Geometry& grid, const Contr
 /// A result as its file has it: on a grid of its own, or of a transform sampled at every voxel of `grid`.
 /// @param grid     that of the volume from which it leads
 /// @param forward  whether it leads from the moving volume to a fixed one
-PullField CaseScorer::read_result(const fs::path& file, const Geometry& grid, bool forward,
+PullField CaseScorer::read_result(const FieldSource& file, const Geometry& grid, bool forward,
                                   std::vector<std::string>& notes, const Control& control) const {
-  const PullChoice choice = parse_pull_fields({file.string()}, options_.common.nifti_frame);
+  const PullChoice choice = parse_pull_fields({text_of(file)}, options_.common.nifti_frame);
   const int threads = options_.common.threads;
   ReadPullField read =
       forward ? read_forward_map(choice, grid, threads, control) : read_field(choice, grid, threads, control);
@@ -207,33 +212,33 @@ void CaseScorer::score_dose(const TruthCase& one, const PullField& result, CaseS
   score.gamma = score::gamma_score(should.view(), is.view(), {}, limits(), control);
 }
 
-void CaseScorer::score_back(const fs::path& back, const TruthCase& one, const Side& side, const PullField& result,
+void CaseScorer::score_back(const FieldSource& back, const TruthCase& one, const Side& side, const PullField& result,
                             CaseScore& score, const Control& control) const {
-  if (back.empty()) return;
-  const fs::path file = result_of(back, set_, one);
-  require(!file.empty(), "there is no result of " + one.name + " in " + back.string());
-  const PullField onto = read_result(file, side.other, !options_.forward, score.notes, control);
+  const auto file = result_of(back, set_, one);
+  require(file.has_value(), "there is no result of " + one.name + " in " + back.path.string());
+  const PullField onto = read_result(*file, side.other, !options_.forward, score.notes, control);
   score.inverse_consistency = score::consistency(result, onto, nullptr, side.counts, limits(), {.stop = control.stop});
 }
 
-void CaseScorer::score_triples(const fs::path& results, const TruthCase& one, const Side& side, const PullField& result,
-                               CaseScore& score, const Control& control) const {
+void CaseScorer::score_triples(const FieldSource& results, const TruthCase& one, const Side& side,
+                               const PullField& result, CaseScore& score, const Control& control) const {
   if (options_.triples.empty()) return;
+  const FieldSource triples = parse_field_source(options_.triples);
   for (const TruthCase& other : set_.cases) {
-    const fs::path between = result_in(options_.triples, one.name + "--" + other.name);
-    if (between.empty()) continue;
-    const fs::path onwards = result_of(results, set_, other);
-    require(!onwards.empty(), between.string() + " leads to " + other.name + ", of which there is no result");
+    const auto between = result_in(triples, one.name + "--" + other.name);
+    if (!between) continue;
+    const auto onwards = result_of(results, set_, other);
+    require(onwards.has_value(), between->path.string() + " leads to " + other.name + ", of which there is no result");
     const Geometry fixed = read_image_header(other.fixed).geometry;
     const PullField first =
-                        sampled(read_result(between, side.grid(), false, score.notes, control), side.grid(), control),
-                    second = read_result(onwards, fixed, false, score.notes, control);
+                        sampled(read_result(*between, side.grid(), false, score.notes, control), side.grid(), control),
+                    second = read_result(*onwards, fixed, false, score.notes, control);
     score.transitivity[other.name] =
         score::consistency(first, second, &result, side.counts, limits(), {.stop = control.stop});
   }
 }
 
-void CaseScorer::score_field(const fs::path& results, const fs::path& back, const TruthCase& one,
+void CaseScorer::score_field(const FieldSource& results, const FieldSource* back, const TruthCase& one,
                              CaseScore& score) const {
   Stage stage(options_.common, one.name);
   const Control control = stage.control();
@@ -241,7 +246,7 @@ void CaseScorer::score_field(const fs::path& results, const fs::path& back, cons
   const Geometry& grid = side.grid();
   const Geometry &moving = moving_.ct->geometry(), &fixed = options_.forward ? side.other : grid;
   const PullField result =
-      sampled(read_result(score.file, grid, options_.forward, score.notes, control), grid, control);
+      sampled(read_result(*result_of(results, set_, one), grid, options_.forward, score.notes, control), grid, control);
 
   const ForwardChoice choice = parse_forward_fields({one.field.string()}, {}, options_.common.nifti_frame);
   const VertexField field = read_field(choice, moving, options_.common.threads, control).field;
@@ -284,7 +289,7 @@ void CaseScorer::score_field(const fs::path& results, const fs::path& back, cons
     score_labels(side, result, score, control);
     score_dose(one, result, score, control);
   }
-  score_back(back, one, side, result, score, control);
+  if (back) score_back(*back, one, side, result, score, control);
   score_triples(results, one, side, result, score, control);
   score.picture = error_picture(*truth, result, side.volumes.ct->view(), side.counts, dense.all.worst);
 }

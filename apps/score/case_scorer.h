@@ -13,6 +13,7 @@
 #include "apps/score/score_report.h"
 #include "apps/truth/truth_set.h"
 #include "backend/factories.h"
+#include "io/field_file.h"
 
 namespace tetwarp::apps {
 
@@ -24,9 +25,9 @@ class CaseScorer {
   CaseScorer(const ScoreOptions& options, TruthSet set);
 
   /// Scores the result of a case. What is wrong with it is told in `CaseScore::failure`.
-  /// @param results  folder or file of --results
-  /// @param back     folder of --back; empty: none
-  CaseScore score(const std::filesystem::path& results, const std::filesystem::path& back, const TruthCase& one,
+  /// @param results  folder or file of --results, with options of the files
+  /// @param back     folder of --back, the same; null: none
+  CaseScore score(const FieldSource& results, const FieldSource* back, const TruthCase& one,
                   const std::vector<ScoreLimit>& limits) const;
 
  private:
@@ -39,20 +40,19 @@ class CaseScorer {
   static Volumes read_volumes(const std::filesystem::path& ct, const std::filesystem::path& labels);
 
   Side side_of(const TruthCase& one) const;
-  PullField read_result(const std::filesystem::path& file, const Geometry& grid, bool forward,
-                        std::vector<std::string>& notes, const Control& control) const;
+  PullField read_result(const FieldSource& file, const Geometry& grid, bool forward, std::vector<std::string>& notes,
+                        const Control& control) const;
   /// A result at every voxel of a grid.
   PullField sampled(PullField field, const Geometry& grid, const Control& control) const;
-  void score_field(const std::filesystem::path& results, const std::filesystem::path& back, const TruthCase& one,
-                   CaseScore& score) const;
+  void score_field(const FieldSource& results, const FieldSource* back, const TruthCase& one, CaseScore& score) const;
   void score_landmarks(const TruthCase& one, const Side& side, const PullField& result, CaseScore& score) const;
   void score_points(const TruthCase& one, CaseScore& score) const;
   void score_labels(const Side& side, const PullField& result, CaseScore& score, const Control& control) const;
   void score_dose(const TruthCase& one, const PullField& result, CaseScore& score, const Control& control) const;
-  void score_back(const std::filesystem::path& back, const TruthCase& one, const Side& side, const PullField& result,
+  void score_back(const FieldSource& back, const TruthCase& one, const Side& side, const PullField& result,
                   CaseScore& score, const Control& control) const;
-  void score_triples(const std::filesystem::path& results, const TruthCase& one, const Side& side,
-                     const PullField& result, CaseScore& score, const Control& control) const;
+  void score_triples(const FieldSource& results, const TruthCase& one, const Side& side, const PullField& result,
+                     CaseScore& score, const Control& control) const;
   /// A volume of the moving side as a result makes it, on a grid.
   AnyVolume warped(const AnyVolume& volume, const PullField& by, const Geometry& grid, Interpolation interpolation,
                    const Control& control) const;

@@ -25,6 +25,16 @@ void check_together(const ScoreOptions& options) {
     throw UsageError("--triples goes with one -r, from fixed to moving");
 }
 
+/// Folders or files of results, with the options behind their names. @throws InputError for one that is not there
+std::vector<FieldSource> sources_of(const std::vector<std::string>& texts) {
+  std::vector<FieldSource> sources;
+  for (const std::string& text : texts) {
+    sources.push_back(parse_field_source(text));
+    require(fs::exists(sources.back().path), "the results, " + sources.back().path.string() + ", are not there");
+  }
+  return sources;
+}
+
 }  // namespace
 
 int run_score(const ScoreOptions& options) {
@@ -37,18 +47,18 @@ int run_score(const ScoreOptions& options) {
     for (const fs::path& file : {one.fixed, one.field, one.body, one.labels, one.landmarks, one.dose, one.bands})
       if (!file.empty()) reads.add_file(file);
   }
-  for (const fs::path& results : options.results) {
-    require(fs::exists(results), "the results, " + results.string() + ", are not there");
-    if (!fs::is_directory(results)) reads.add_file(results);
+  const std::vector<FieldSource> results = sources_of(options.results), back = sources_of(options.back);
+  for (const FieldSource& result : results) {
+    const bool folder = fs::is_directory(result.path);
+    if (!folder) reads.add_file(result.path);
     for (const fs::path& output : {options.json, options.csv, options.html}) {
-      if (!output.empty() && fs::is_directory(results) &&
-          fs::weakly_canonical(fs::absolute(output).parent_path()) == fs::canonical(results))
+      if (!output.empty() && folder &&
+          fs::weakly_canonical(fs::absolute(output).parent_path()) == fs::canonical(result.path))
         throw UsageError(output.string() + " would lie among the results; put it elsewhere");
     }
   }
-  for (const fs::path& folder : options.back)
-    require(fs::exists(folder), "the results, " + folder.string() + ", are not there");
-  require(options.triples.empty() || fs::is_directory(options.triples), options.triples.string() + " is no folder");
+  require(options.triples.empty() || fs::is_directory(parse_field_source(options.triples).path),
+          options.triples + " is no folder");
   if (!options.limits.empty()) reads.add_file(options.limits);
   OutputSet outputs(reads, options.common.overwrite);
   const fs::path json_file = outputs.add(options.json), csv = outputs.add(options.csv),
@@ -56,10 +66,9 @@ int run_score(const ScoreOptions& options) {
   const CaseScorer scorer(options, set);
   std::vector<CaseScore> scores;
   for (const TruthCase& one : set.cases) {
-    for (std::size_t n = 0; n < options.results.size(); ++n) {
-      const fs::path& results = options.results[n];
-      scores.push_back(scorer.score(results, options.back.empty() ? fs::path() : options.back[n], one, limits));
-      std::cout << (options.results.size() > 1 ? results.string() + ", " : "") << line_of(scores.back()) << "\n";
+    for (std::size_t n = 0; n < results.size(); ++n) {
+      scores.push_back(scorer.score(results[n], back.empty() ? nullptr : &back[n], one, limits));
+      std::cout << (results.size() > 1 ? scores.back().result + ", " : "") << line_of(scores.back()) << "\n";
       for (const std::string& note : scores.back().notes)
         say(options.common, "tetwarp: note: " + one.name + ": " + note);
     }

@@ -13,7 +13,9 @@ void add_score(CLI::App& app, ScoreOptions& options) {
       ->add_option("-r,--results", options.results,
                    "Folder with a result of each case, named CASE and a suffix: a displacement field or transform from "
                    "fixed to moving, or CASE.csv, the landmarks of the fixed volume taken to the moving one; of a set "
-                   "with one case also a file. May be repeated: results side by side")
+                   "with one case also a file. What a file does not say stands behind the folder's name, as for "
+                   "--pull-field: warps:values=positions,frame=ras. May be repeated: results side by side")
+      ->type_name("RESULTS")
       ->required();
   command
       ->add_option_function<std::string>(

@@ -85,7 +85,8 @@ def score(
         A set that `truth` made.
     results : path, or several
         Folders with a result of each case, named CASE and a suffix: a displacement field or transform from fixed to
-        moving, or CASE.csv, the landmarks of the fixed volume taken to the moving one.
+        moving, or CASE.csv, the landmarks of the fixed volume taken to the moving one. What files do not say stands behind
+        the folder's name: "warps:values=positions,frame=ras".
     **options
         Those of the command line with underscores: `direction="forward"`, `back="other_direction"`, `triples="between"`,
         `limits="limits.json"`, `html="page.html"`, `csv="table.csv"`.

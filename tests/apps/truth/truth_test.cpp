@@ -332,6 +332,47 @@ TEST_F(TruthProgram, LandmarksAreScored) {
   EXPECT_EQ(run("score set -r points --csv points/all.csv"), 2) << "among the results";
 }
 
+/// An array of NumPy, z, y, x, as a registration in Python would save it.
+void write_array(const fs::path& path, const glm::i64vec3& size, const std::vector<glm::vec3>& values) {
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + std::to_string(size.z) + ", " +
+                       std::to_string(size.y) + ", " + std::to_string(size.x) + ", 3), }";
+  header.resize(117, ' ');
+  fs::create_directories(path.parent_path());
+  std::ofstream file(path, std::ios::binary);
+  file << std::string("\x93NUMPY\x01\0", 8) << static_cast<char>(header.size() + 1) << '\0' << header << '\n';
+  file.write(reinterpret_cast<const char*>(values.data()),
+             static_cast<std::streamsize>(values.size() * sizeof(glm::vec3)));
+}
+
+TEST_F(TruthProgram, WhatAResultDoesNotSayStandsBehindItsFolder) {
+  make_phantom();
+  ASSERT_EQ(run("truth ct.nii.gz -o set --dense --case elastic:amplitude=6,spacing=80 --case shift"), 0) << err();
+  for (const char* name : {"elastic-amplitude-6-spacing-80", "shift"}) {
+    const fs::path folder = at("set") / name, file = std::string(name) + ".npy";
+    const PullField inverse = read_pull_field(folder / "inverse.nii.gz");
+    const VertexField forward = read_forward_field(folder / "forward.nii.gz");
+    write_array(at("there") / file, inverse.grid.size, inverse.displacement);
+    write_array(at("back") / file, forward.lattice.size, forward.displacement);
+  }
+  const std::string options = ":order=zyx,units=mm";
+  EXPECT_EQ(run("score set -r there" + options + " --back back" + options + " --json a.json"), 0) << out() << err();
+  const json scores = document("a.json").at("scores");
+  ASSERT_EQ(scores.size(), 2U);
+  for (const json& score : scores) {
+    EXPECT_LT(score.at("body").at("largest_mm").get<double>(), 1e-3);
+    EXPECT_LT(score.at("inverse_consistency").at("largest_mm").get<double>(), 2);
+    EXPECT_EQ(score.at("result"), "there" + options);
+  }
+  // An array may be anything.
+  EXPECT_EQ(run("score set -r there"), 2);
+  EXPECT_NE(err().find("order="), std::string::npos) << err();
+  EXPECT_EQ(run("score set -r nothing" + options), 4);
+  fs::remove(at("there/shift.npy"));
+  fs::copy_file(at("set/moving/landmarks.csv"), at("there/shift.csv"));
+  EXPECT_EQ(run("score set -r there" + options), 3);
+  EXPECT_NE(out().find("points, which take no options"), std::string::npos) << out();
+}
+
 #ifdef TETWARP_WITH_DCMTK
 TEST_F(TruthProgram, OfASeriesEachCaseIsASeriesToo) {
   ASSERT_EQ(run("phantom -o ct --size 48,44,30 --spacing 8,9,10 --noise 0"), 0);
