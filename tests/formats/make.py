@@ -14,7 +14,8 @@ and the expected files:
 - warped.nii.gz: moving.nii.gz warped by the program, linear
 
 The two volumes are oblique, of different sizes, and one of them is right-handed. Packages: those of PyPI that CASES names;
-plastimatch, elastix and mrtrix3 of Debian.
+plastimatch, elastix and mrtrix3 of Debian. Where FOLDER holds fixed.nii.gz and moving.nii.gz already, they are taken: table.py
+then says what the differences are on scans.
 """
 import importlib.metadata
 import json
@@ -199,11 +200,12 @@ def case_elastix_toml(volumes, folder):
     transformix = itk.TransformixFilter.New(moving)
     transformix.SetTransformParameterObject(result)
     transformix.SetComputeDeformationField(True)
+    transformix.SetOutputDirectory(str(folder))
     transformix.Update()
     vectors = itk.array_from_image(transformix.GetOutputDeformationField())  # k, j, i, xyz; LPS
     there = volumes.points + np.moveaxis(vectors, (0, 1, 2), (2, 1, 0)).reshape(-1, 3) * LPS
     values = np.moveaxis(itk.array_from_image(transformix.GetOutput()), (0, 1, 2), (2, 1, 0))
-    for file in folder.glob("result.*"):
+    for file in [*folder.glob("result.*"), *folder.glob("deformationField.*")]:
         file.unlink()
     for file in folder.glob("*.toml"):  # the name of the initial transform without a folder of the maker's machine
         file.write_text(file.read_text().replace(str(folder) + "/", ""))
