@@ -15,7 +15,7 @@
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
-#include "io/fields/registration_item.h"
+#include "io/fields/shared/registration_item.h"
 #include "io/images/image_reader.h"
 
 namespace tetwarp {

@@ -8,7 +8,7 @@
 
 #include "deform/errors.h"
 #include "io/fields/field_image.h"
-#include "io/fields/fsl_frame.h"
+#include "io/fields/shared/fsl_frame.h"
 #include "io/fields/transform_niftyreg.h"
 #include "io/images/nifti_file.h"
 #include "io/ras.h"

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "io/fields/numpy_array.h"
+#include "io/fields/shared/numpy_array.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "deform/errors.h"
-#include "io/fields/numpy_array.h"
+#include "io/fields/shared/numpy_array.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
 

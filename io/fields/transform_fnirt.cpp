@@ -10,9 +10,9 @@
 #include <glm/vector_relational.hpp>
 
 #include "deform/errors.h"
-#include "io/fields/cubic_spline.h"
 #include "io/fields/field_image.h"
-#include "io/fields/fsl_frame.h"
+#include "io/fields/shared/cubic_spline.h"
+#include "io/fields/shared/fsl_frame.h"
 #include "io/images/nifti_file.h"
 #include "io/opened_file.h"
 #include "io/ras.h"

@@ -10,7 +10,7 @@
 
 #include "deform/errors.h"
 #include "deform/text/text_number.h"
-#include "io/fields/fsl_frame.h"
+#include "io/fields/shared/fsl_frame.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
 #include "io/ras.h"

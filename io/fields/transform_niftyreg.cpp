@@ -8,8 +8,8 @@
 #include <memory>
 
 #include "deform/errors.h"
-#include "io/fields/cubic_spline.h"
 #include "io/fields/field_image.h"
+#include "io/fields/shared/cubic_spline.h"
 #include "io/images/image_reader.h"
 #include "io/opened_file.h"
 #include "io/ras.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/fields/cubic_spline.h"
+#include "io/fields/shared/cubic_spline.h"
 
 #include <algorithm>
 #include <array>

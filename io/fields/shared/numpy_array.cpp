@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/fields/numpy_array.h"
+#include "io/fields/shared/numpy_array.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/fields/fsl_frame.h"
+#include "io/fields/shared/fsl_frame.h"
 
 #include <glm/matrix.hpp>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "io/fields/registration_item.h"
+#include "io/fields/shared/registration_item.h"
 
 #include <algorithm>
 #include <cmath>
