@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <charconv>
 #include <cmath>
 
 #include "deform/errors.h"
+#include "io/fields/shared/ordered_values.h"
 #include "io/images/image_reader.h"
 
 namespace tetwarp {
@@ -121,11 +121,14 @@ class NumpyReader final : public FieldReader {
   void read(std::span<glm::vec3> displacement) const override {
     require(placed_,
             "a field without a grid, " + path_.string() + "; an array lies where the volume does: give its grid");
-    if (array_.type == VoxelType::f32) {
-      read_as<float, std::uint32_t>(displacement);
-    } else {
-      read_as<double, std::uint64_t>(displacement);
-    }
+    const std::unique_ptr<std::istream> stream = open_();
+    stream->seekg(static_cast<std::streamoff>(array_.offset));
+    const auto next = [&](std::span<std::byte> bytes) {
+      stream->read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      require(stream->good(), "truncated or damaged values, " + path_.string() + "; is the file whole?");
+    };
+    auto* const floats = reinterpret_cast<float*>(displacement.data());
+    read_values(value_order(), next, [&](std::size_t at, auto value) { floats[at] = static_cast<float>(value); });
     if (header_.frame == "LPS") return;
     const glm::dmat3 mm =
         header_.frame == "RAS" ? glm::dmat3(-1, 0, 0, 0, -1, 0, 0, 0, 1) : point_from_index(header_.grid).linear;
@@ -137,55 +140,18 @@ class NumpyReader final : public FieldReader {
   }
 
  private:
-  /// How many floats apart neighbours along each axis of the array lie in the displacements.
-  std::array<std::size_t, 4> strides() const {
-    const auto x = static_cast<std::size_t>(header_.grid.size.x), y = static_cast<std::size_t>(header_.grid.size.y);
-    std::array<std::size_t, 4> steps = {3, 3 * x, 3 * x * y, 1};
+  ValueOrder value_order() const {
+    const auto x = static_cast<std::ptrdiff_t>(header_.grid.size.x),
+               y = static_cast<std::ptrdiff_t>(header_.grid.size.y);
+    std::array<std::ptrdiff_t, 4> steps = {3, 3 * x, 3 * x * y, components_xyz_ ? 1 : -1};
     if (!order_xyz_) std::swap(steps[0], steps[2]);
-    return steps;
-  }
-
-  /// Reads the values in the file's order, a plane of its two fastest axes at a time, and puts each in its place.
-  template <class Value, class Bits>
-  void read_as(std::span<glm::vec3> displacement) const {
-    std::array<std::size_t, 4> extent{}, stride = strides();
-    std::copy(array_.shape.begin(), array_.shape.end(), extent.begin());
-    if (array_.fortran) {
-      std::reverse(extent.begin(), extent.end());
-      std::reverse(stride.begin(), stride.end());
-    }
-    const std::size_t component_axis = array_.fortran ? 0 : 3;
-    const std::unique_ptr<std::istream> opened = open_();
-    std::istream& stream = *opened;
-    stream.seekg(static_cast<std::streamoff>(array_.offset));
-    std::vector<Bits> plane(extent[2] * extent[3]);
-    auto* const values = reinterpret_cast<float*>(displacement.data());
-    const bool swap = array_.big_endian != (std::endian::native == std::endian::big);
-    // Components that the file has in the order z, y, x go backwards from 2.
-    const auto place = [&](std::size_t axis, std::size_t i) {
-      return stride[axis] * (axis == component_axis && !components_xyz_ ? 2 - i : i);
-    };
-    for (std::size_t a = 0; a < extent[0]; ++a) {
-      for (std::size_t b = 0; b < extent[1]; ++b) {
-        stream.read(reinterpret_cast<char*>(plane.data()), static_cast<std::streamsize>(plane.size() * sizeof(Bits)));
-        require(stream.good(), "truncated or damaged values, " + path_.string() + "; is the file whole?");
-        std::size_t n = 0;
-        for (std::size_t c = 0; c < extent[2]; ++c) {
-          for (std::size_t d = 0; d < extent[3]; ++d, ++n) {
-            const Bits bits = swap ? reversed(plane[n]) : plane[n];
-            values[place(0, a) + place(1, b) + place(2, c) + place(3, d)] =
-                static_cast<float>(std::bit_cast<Value>(bits));
-          }
-        }
-      }
-    }
-  }
-
-  template <class Bits>
-  static Bits reversed(Bits bits) {
-    auto bytes = std::bit_cast<std::array<std::byte, sizeof(Bits)>>(bits);
-    std::reverse(bytes.begin(), bytes.end());
-    return std::bit_cast<Bits>(bytes);
+    ValueOrder order;
+    order.type = array_.type;
+    order.big_endian = array_.big_endian;
+    for (std::size_t axis = 0; axis < steps.size(); ++axis)
+      order.axes[axis] = {static_cast<std::size_t>(array_.shape[axis]), steps[axis]};
+    if (array_.fortran) std::ranges::reverse(order.axes);
+    return order;
   }
 
   std::filesystem::path path_;
