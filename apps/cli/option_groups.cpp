@@ -94,9 +94,9 @@ CLI::Validator size_in_bytes() {
 
 const char* const kInputHelp = "Folder of DICOM files, one DICOM file, or .nii .nii.gz .nrrd .mha";
 const char* const kFieldHelp =
-    "Forward field: a file (.mha .nrrd .mgz .nii .nii.gz, of which some need values=displacements|positions and "
-    "frame=lps|ras, those of FSL source=MOVING; .npy or .npz:order=zyx|xyz,units=mm|voxel, with key=NAME; .vts .vti "
-    ".vtr "
+    "Forward field: a file (.mha .nrrd .mgz .nii .nii.gz .mif .mif.gz, of which some need "
+    "values=displacements|positions and frame=lps|ras, those of FSL source=MOVING; .npy or "
+    ".npz:order=zyx|xyz,units=mm|voxel, with key=NAME; .vts .vti .vtr "
     ".vtk[:displacement=NAME,frame=lps|ras,units=mm|m]), a transform of ITK, ANTs, elastix, plastimatch (.h5 .tfm .txt "
     ".mat .toml), NiftyReg and FSL (their B-splines), FreeSurfer (.lta) or a 4 x 4 matrix "
     "(.mat:tool=greedy|c3d|niftyreg|mrtrix|flirt), each vertex x goes to T(x), an affine one with invert=yes to where "

@@ -22,9 +22,10 @@ namespace fs = std::filesystem;
 using score::Counts;
 
 /// Suffixes of results: those of fields, transforms and points.
-constexpr const char* kSuffixes[] = {".mha", ".mhd",  ".nrrd", ".nhdr", ".nii", ".nii.gz", ".h5",      ".hdf5", ".tfm",
-                                     ".txt", ".toml", ".mat",  ".lta",  ".mgz", ".mgh",    ".npy",     ".npz",  ".vts",
-                                     ".vti", ".vtr",  ".vtk",  ".dcm",  ".csv", ".fcsv",   ".mrk.json"};
+constexpr const char* kSuffixes[] = {".mha",  ".mhd", ".nrrd",   ".nhdr", ".nii",  ".nii.gz",  ".h5",
+                                     ".hdf5", ".tfm", ".txt",    ".toml", ".mat",  ".lta",     ".mgz",
+                                     ".mgh",  ".mif", ".mif.gz", ".npy",  ".npz",  ".vts",     ".vti",
+                                     ".vtr",  ".vtk", ".dcm",    ".csv",  ".fcsv", ".mrk.json"};
 
 /// The file in a folder whose name is `name` and a suffix, with the options of the folder; none: there is no such file.
 /// @throws InputError for several

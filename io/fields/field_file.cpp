@@ -38,8 +38,8 @@ const FieldFormat& required_format(const std::filesystem::path& path) {
   const FieldFormat* format = format_of(path);
   require(format != nullptr || is_there(path), "no such file, " + path.string());
   require(format != nullptr, "not a field file, " + path.string() +
-                                 "; expected .mha .nrrd .nii .nii.gz .mgz .npy .npz .vts .vti .vtr .vtk, or "
-                                 "a DICOM Deformable Spatial Registration");
+                                 "; expected .mha .nrrd .nii .nii.gz .mgz .mif .mif.gz .npy .npz .vts .vti .vtr "
+                                 ".vtk, or a DICOM Deformable Spatial Registration");
   return *format;
 }
 

@@ -23,20 +23,6 @@
 namespace tetwarp {
 namespace {
 
-/// Columns of unit length at right angles, within what the formats' digits (float32 in NIfTI) can hold.
-void require_orthogonal(const Geometry& geometry, const std::string& file) {
-  const glm::dmat3& d = geometry.direction;
-  for (int a = 0; a < 3; ++a) {
-    const int b = (a + 1) % 3;
-    require(std::abs(glm::length(d[a]) - 1) <= 1e-4, "a direction of axis " + std::to_string(a) + " with length " +
-                                                         std::to_string(glm::length(d[a])) + ", " + file +
-                                                         "; expected 1");
-    require(std::abs(glm::dot(d[a], d[b])) <= 1e-4,
-            "a sheared grid (cosine between axes " + std::to_string(a) + " and " + std::to_string(b) + " is " +
-                std::to_string(glm::dot(d[a], d[b])) + "), " + file + "; expected right angles");
-  }
-}
-
 /// A header that promises more voxels than the file can hold is not believed: nothing is allocated for it. Nor is one
 /// that leaves bytes over, where the voxels are stored as they are: it is about another volume, or the file is damaged.
 void require_file_holds(const std::filesystem::path& path, const ImageHeader& header, const StoredVoxels& stored) {
@@ -108,6 +94,19 @@ ImageFormat required_format(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+void require_orthogonal(const Geometry& geometry, const std::string& file) {
+  const glm::dmat3& d = geometry.direction;
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3;
+    require(std::abs(glm::length(d[a]) - 1) <= 1e-4, "a direction of axis " + std::to_string(a) + " with length " +
+                                                         std::to_string(glm::length(d[a])) + ", " + file +
+                                                         "; expected 1");
+    require(std::abs(glm::dot(d[a], d[b])) <= 1e-4,
+            "a sheared grid (cosine between axes " + std::to_string(a) + " and " + std::to_string(b) + " is " +
+                std::to_string(glm::dot(d[a], d[b])) + "), " + file + "; expected right angles");
+  }
+}
 
 std::optional<ImageFormat> image_format(const std::filesystem::path& path) {
   const std::string name = lower(path.filename().string());

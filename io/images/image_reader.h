@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "io/image_file.h"
@@ -54,6 +55,10 @@ class ImageReader {
 
 /// @throws InputError naming the file: missing, no regular file, empty, without the right to read it
 void require_readable_file(const std::filesystem::path& path);
+
+/// @throws InputError naming the file, unless the columns of the direction have length 1 and stand at right angles,
+///         within what the formats' digits (float32 in NIfTI) can hold
+void require_orthogonal(const Geometry& geometry, const std::string& file);
 
 /// Reads and checks the header; a header that promises more than the file can hold is refused here, before anything is
 /// allocated. @throws InputError as `read_image_header`

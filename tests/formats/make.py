@@ -90,9 +90,9 @@ def moved(matrix, points):
     return nibabel.affines.apply_affine(matrix, points)
 
 
-def run(*command):
-    """Runs a program."""
-    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+def run(*command, folder=None):
+    """Runs a program, in a folder where its files shall not name folders of the maker's machine."""
+    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL, cwd=folder)
 
 
 def version_of(package):
@@ -237,7 +237,7 @@ def on_fixed(volumes, path):
         if step[axis, axis] == -1:
             values = np.flip(values, axis)
     path.unlink()
-    assert np.abs(step[:3, :3]).sum() == 3 and values.shape == volumes.fixed.shape
+    assert np.abs(step[:3, :3]).sum() == 3 and values.shape[:3] == volumes.fixed.shape
     return nibabel.Nifti1Image(values, volumes.fixed.affine)
 
 
@@ -262,6 +262,45 @@ def case_mrtrix_displacement(volumes, folder):
     run("warpconvert", "-quiet", folder / "warp.nii.gz", "deformation2displacement", folder / "displacement.nii.gz")
     (folder / "warp.nii.gz").unlink()
     return "MRtrix", mrtrix_version(), ["displacement.nii.gz:values=displacements,frame=ras"], there, None
+
+
+def by_mrtrix(volumes, folder, positions):
+    """Points and the moving volume by a deformation in MRtrix's own format, which MRtrix reads again."""
+    run("mrconvert", "-quiet", positions, "-strides", "1,2,3,4", folder / "read.nii.gz")
+    run("mrtransform", "-quiet", volumes.folder / MOVING, "-warp", positions, "-interp", "linear", "-strides", "1,2,3",
+        folder / "out.nii.gz")
+    there = np.asarray(on_fixed(volumes, folder / "read.nii.gz").dataobj).reshape(-1, 3)
+    return there, on_fixed(volumes, folder / "out.nii.gz")
+
+
+def case_mrtrix_mif(name, *options, displacements=False):
+    """A case of a warp in MRtrix's own format, with its values in an order that the options of mrconvert say."""
+
+    def case(volumes, folder):
+        there = moved(MATRIX, volumes.points) + volumes.displacement().reshape(-1, 3)
+        image = nibabel.Nifti1Image(there.reshape(*volumes.fixed.shape, 3).astype(np.float32), volumes.fixed.affine)
+        made, positions, values = "made.nii.gz", folder / name, "positions"
+        nibabel.save(image, folder / made)
+        if displacements:
+            run("warpconvert", "-quiet", made, "deformation2displacement", "by.nii.gz", folder=folder)
+            made, positions, values = "by.nii.gz", folder / "positions.mif", "displacements"
+        run("mrconvert", "-quiet", made, name, *options, folder=folder)  # its header holds this command
+        if displacements:
+            run("warpconvert", "-quiet", folder / name, "displacement2deformation", positions)
+        read = by_mrtrix(volumes, folder, positions)
+        for file in [*folder.glob("*.nii.gz"), *folder.glob("positions.mif")]:
+            file.unlink()
+        return "MRtrix", mrtrix_version(), [f"{name}:values={values}"], *read
+
+    return case
+
+
+def case_mrtrix_registration(volumes, folder):
+    """The deformation of a registration by mrregister."""
+    run("mrregister", "-quiet", f"../{MOVING}", f"../{FIXED}", "-type", "nonlinear", "-nl_scale", "1", "-nl_niter", "20", "-nl_warp", "warp.mif",
+        "back.mif", "-nthreads", "0", folder=folder)
+    (folder / "back.mif").unlink()
+    return "MRtrix", mrtrix_version(), ["warp.mif:values=positions"], *by_mrtrix(volumes, folder, folder / "warp.mif")
 
 
 def surfa_warp(volumes):
@@ -481,6 +520,11 @@ CASES = {
     "mrtrix-linear": case_mrtrix_linear,
     "mrtrix-warp": case_mrtrix_warp,
     "mrtrix-displacement": case_mrtrix_displacement,
+    "mrtrix-registration": case_mrtrix_registration,
+    "mrtrix-mif": case_mrtrix_mif("warp.mif", "-strides", "2,3,4,1"),
+    "mrtrix-mif-backwards": case_mrtrix_mif("warp.mif", "-strides", "-3,2,-1,4", "-datatype", "float32be"),
+    "mrtrix-mif-left": case_mrtrix_mif("warp.mif", "-config", "RealignTransform", "false"),
+    "mrtrix-mif-packed": case_mrtrix_mif("displacement.mif.gz", "-strides", "-2,4,-1,3", displacements=True),
     "freesurfer-abs-crs": case_freesurfer("abs_crs"),
     "freesurfer-disp-crs": case_freesurfer("disp_crs"),
     "freesurfer-abs-ras": case_freesurfer("abs_ras"),
