@@ -14,8 +14,8 @@ and the expected files:
 - warped.nii.gz: moving.nii.gz warped by the program, linear
 
 The two volumes are oblique, of different sizes, and one of them is right-handed. Packages: those of PyPI that CASES names;
-plastimatch, elastix and mrtrix3 of Debian. Where FOLDER holds fixed.nii.gz and moving.nii.gz already, they are taken: table.py
-then says what the differences are on scans.
+plastimatch, elastix and mrtrix3 of Debian; the programs of NiftyReg, built from its source. Where FOLDER holds fixed.nii.gz and
+moving.nii.gz already, they are taken: table.py then says what the differences are on scans.
 """
 import importlib.metadata
 import json
@@ -425,6 +425,60 @@ def case_fnirt_coefficients(volumes, folder):
     return "FSL fnirt", "fslpy " + version_of("fslpy"), [argument], there, None
 
 
+def niftyreg_version():
+    """The version of NiftyReg, whose programs must be in PATH."""
+    return subprocess.run(["reg_f3d", "--version"], check=True, capture_output=True, text=True).stdout.split()[-1]
+
+
+def by_niftyreg(volumes, folder, transform):
+    """Points by the deformation field that reg_transform makes of any transform, and the moving volume by reg_resample."""
+    fixed, moving, field, out = volumes.folder / FIXED, volumes.folder / MOVING, folder / "points.nii", folder / "out.nii"
+    run("reg_transform", "-ref", fixed, "-def", transform, field)
+    run("reg_resample", "-ref", fixed, "-flo", moving, "-trans", transform, "-res", out, "-inter", 1, "-pad", 0)
+    there = np.asarray(nibabel.load(field).dataobj)
+    warped = np.asarray(nibabel.load(out).dataobj, np.float32)
+    assert there.shape == (*volumes.fixed.shape, 1, 3) and warped.shape == volumes.fixed.shape
+    for file in (field, out):
+        file.unlink()
+    return there.reshape(-1, 3), nibabel.Nifti1Image(warped, volumes.fixed.affine)
+
+
+def niftyreg_spline(volumes, folder):
+    """A registration by reg_f3d: a cubic B-spline. Its control points are not 5 voxels apart along i: if they are, reg_f3d
+    and reg_resample of 1.5.70 take them to be so along j and k too, and reg_transform does not."""
+    run("reg_f3d", "-ref", volumes.folder / FIXED, "-flo", volumes.folder / MOVING, "-cpp", folder / "cpp.nii.gz", "-res",
+        folder / "result.nii.gz", "-sx", -4, "-sy", -5, "-sz", -3, "-ln", 1, "-lp", 1, "-maxit", 20, "-be", 0.0001)
+    (folder / "result.nii.gz").unlink()
+    return folder / "cpp.nii.gz"
+
+
+def case_niftyreg_spline(volumes, folder):
+    """The B-spline of a registration by reg_f3d."""
+    spline = niftyreg_spline(volumes, folder)
+    return "NiftyReg", niftyreg_version(), [spline.name], *by_niftyreg(volumes, folder, spline)
+
+
+def case_niftyreg_field(option, name):
+    """A case of the field that reg_transform makes of that B-spline: positions (-def) or displacements (-disp)."""
+
+    def case(volumes, folder):
+        spline = niftyreg_spline(volumes, folder)
+        run("reg_transform", "-ref", volumes.folder / FIXED, option, spline, folder / name)
+        spline.unlink()
+        return "NiftyReg", niftyreg_version(), [name], *by_niftyreg(volumes, folder, folder / name)
+
+    return case
+
+
+def case_niftyreg_affine(volumes, folder):
+    """The matrix of an affine registration by reg_aladin, in text."""
+    run("reg_aladin", "-ref", volumes.folder / FIXED, "-flo", volumes.folder / MOVING, "-aff", folder / "affine.txt",
+        "-res", folder / "result.nii.gz", "-ln", 1, "-lp", 1, "-maxit", 5, "-noSym")
+    (folder / "result.nii.gz").unlink()
+    there, warped = by_niftyreg(volumes, folder, folder / "affine.txt")
+    return "NiftyReg", niftyreg_version(), ["affine.txt:tool=niftyreg"], there, warped
+
+
 def case_spm(volumes, folder):
     """A deformation of SPM12 by its published layout: positions in RAS mm, five axes, intent_name Mapping."""
     there = moved(MATRIX, volumes.points) + volumes.displacement().reshape(-1, 3)
@@ -536,6 +590,10 @@ CASES = {
     "fsl-fnirt-relative": case_fnirt("relative"),
     "fsl-fnirt-absolute": case_fnirt("absolute"),
     "fsl-fnirt-coefficients": case_fnirt_coefficients,
+    "niftyreg-affine": case_niftyreg_affine,
+    "niftyreg-spline": case_niftyreg_spline,
+    "niftyreg-deformation": case_niftyreg_field("-def", "deformation.nii.gz"),
+    "niftyreg-displacement": case_niftyreg_field("-disp", "displacement.nii.gz"),
     "spm": case_spm,
     "voxelmorph": case_voxelmorph,
 }
