@@ -5,10 +5,10 @@
 
 #include <itk_H5Cpp.h>
 
-#include <algorithm>
 #include <fstream>
 
 #include "deform/errors.h"
+#include "itkbridge/transforms/hdf5_list.h"
 
 namespace tetwarp {
 namespace {
@@ -18,23 +18,20 @@ constexpr std::size_t kLongestText = 1000;
 
 class Hdf5Reader {
  public:
-  explicit Hdf5Reader(const std::filesystem::path& path)
-      : file_(path.string()),
-        bytes_(static_cast<double>(std::filesystem::file_size(path))),
-        hdf5_(path.string(), H5F_ACC_RDONLY) {}
+  explicit Hdf5Reader(const std::filesystem::path& path) : source_(path), hdf5_(path.string(), H5F_ACC_RDONLY) {}
 
-  std::vector<TransformRecord> read() const {
+  std::vector<ReadRecord> read() const {
     require(hdf5_.nameExists("/TransformGroup"), "no /TransformGroup in " + file_ + "; expected ITK's transforms");
     const hsize_t count = hdf5_.openGroup("/TransformGroup").getNumObjs();
     require(count <= kMostTransforms, std::to_string(count) + " transforms in " + file_ + "; expected at most " +
                                           std::to_string(kMostTransforms));
-    std::vector<TransformRecord> records;
+    std::vector<ReadRecord> records;
     for (hsize_t n = 0; n < count; ++n) {
       const std::string group = "/TransformGroup/" + std::to_string(n);
-      TransformRecord record{text(group + "/TransformType"), {}, {}};
-      if (!record.type.starts_with("CompositeTransform")) {
-        record.fixed = values(group, "FixedParameters");
-        record.parameters = values(group, "Parameters");
+      ReadRecord record{text(group + "/TransformType"), {}, {}};
+      if (!record.name.starts_with("CompositeTransform")) {
+        record.head = values(group, "FixedParameters");
+        record.values = values(group, "Parameters");
       }
       records.push_back(std::move(record));
     }
@@ -62,7 +59,7 @@ class Hdf5Reader {
     require(set.getStorageSize() == 16, damaged);
     std::ifstream stream(file_, std::ios::binary);
     const auto number = [&](std::uint64_t at, int bytes) {  // little endian
-      require(static_cast<double>(at) + bytes <= bytes_, damaged);
+      require(static_cast<double>(at) + bytes <= source_.bytes, damaged);
       unsigned char raw[8] = {};
       stream.seekg(static_cast<std::streamoff>(at));
       stream.read(reinterpret_cast<char*>(raw), bytes);
@@ -77,7 +74,7 @@ class Hdf5Reader {
     for (std::uint64_t at = heap + 16; at + 16 + length <= end;) {
       const std::uint64_t index = number(at, 2), size = number(at + 8, 8);
       if (index == wanted) {
-        require(size >= length && static_cast<double>(at + 16 + length) <= bytes_, damaged);
+        require(size >= length && static_cast<double>(at + 16 + length) <= source_.bytes, damaged);
         std::string value(length, '\0');
         stream.seekg(static_cast<std::streamoff>(at + 16));
         stream.read(value.data(), static_cast<std::streamsize>(length));
@@ -89,49 +86,20 @@ class Hdf5Reader {
     throw InputError(damaged);
   }
 
-  /// Whether a type is float or double of IEEE 754, which ITK writes. HDF5 can hold floating-point numbers of any
-  /// layout and length.
-  static bool is_float_or_double(const H5::DataType& type) {
-    using Type = H5::PredType;
-    return type == Type::IEEE_F64LE || type == Type::IEEE_F32LE || type == Type::IEEE_F64BE || type == Type::IEEE_F32BE;
-  }
-
-  /// Number of values in a chunk, for which HDF5 allocates memory however few of them are read; 0: there are no chunks.
-  static hsize_t chunk_of(const H5::DataSet& set) {
-    const H5::DSetCreatPropList layout = set.getCreatePlist();
-    hsize_t chunk = 0;
-    if (layout.getLayout() == H5D_CHUNKED) layout.getChunk(1, &chunk);
-    return chunk;
-  }
-
   std::vector<double> values(const std::string& group, const std::string& what) const {
     std::string name = group + "/Transform" + what;
     if (!hdf5_.nameExists(name)) name = group + "/Tranform" + what;  // ITK 4 and 5 misspell the name like this
-    const H5::DataSet set = hdf5_.openDataSet(name);
-    const H5::DataSpace space = set.getSpace();
-    require(is_float_or_double(set.getDataType()) && space.isSimple() && space.getSimpleExtentNdims() == 1,
-            name + " is not a list of floats or doubles, " + file_);
-    hsize_t count = 0;
-    space.getSimpleExtentDims(&count);
-    const auto stored = static_cast<double>(set.getStorageSize());
-    const double needed =
-        static_cast<double>(std::max(count, chunk_of(set))) * static_cast<double>(set.getDataType().getSize());
-    require(stored <= bytes_ && needed <= stored * static_cast<double>(kDeflateAtMost),
-            "truncated, or a header that promises too much, " + file_ + ": " + name + " has " + std::to_string(count) +
-                " values");
-    std::vector<double> numbers(count);
-    if (count > 0) set.read(numbers.data(), H5::PredType::NATIVE_DOUBLE);
-    return numbers;
+    return hdf5_list(hdf5_.openDataSet(name), Hdf5Numbers::real, name, source_);
   }
 
-  std::string file_;
-  double bytes_;
+  Hdf5Source source_;
+  const std::string& file_ = source_.file;
   H5::H5File hdf5_;
 };
 
 }  // namespace
 
-std::vector<TransformRecord> read_hdf5_unconfined(const std::filesystem::path& path) {
+std::vector<ReadRecord> read_hdf5_unconfined(const std::filesystem::path& path) {
   try {
     H5::Exception::dontPrint();
     return Hdf5Reader(path).read();

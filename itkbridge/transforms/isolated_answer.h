@@ -7,7 +7,7 @@
 // machine.
 //
 //   kReadGreeting, then one Answer:
-//     records    how many, and of each its type, its fixed parameters, its parameters
+//     records    how many, and of each its name, its head, its values
 //     refusal    the words
 //     no_memory  nothing more
 //

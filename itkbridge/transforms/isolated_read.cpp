@@ -56,14 +56,14 @@ class AnswerReader {
     read(values.data(), count * sizeof(typename Array::value_type));
     return values;
   }
-  std::vector<TransformRecord> records() {
-    std::vector<TransformRecord> records;
+  std::vector<ReadRecord> records() {
+    std::vector<ReadRecord> records;
     for (std::uint64_t left = number(); left > 0; --left) {
-      take(1, sizeof(TransformRecord));
-      TransformRecord& record = records.emplace_back();
-      record.type = array<std::string>();
-      record.fixed = array<std::vector<double>>();
-      record.parameters = array<std::vector<double>>();
+      take(1, sizeof(ReadRecord));
+      ReadRecord& record = records.emplace_back();
+      record.name = array<std::string>();
+      record.head = array<std::vector<double>>();
+      record.values = array<std::vector<double>>();
     }
     return records;
   }
@@ -105,9 +105,9 @@ std::string ending(std::optional<int> status, const IsolatedLimits& limits) {
 
 }  // namespace
 
-std::vector<TransformRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
-                                           const IsolatedLimits& limits, const std::string& library,
-                                           const std::stop_token& stop) {
+std::vector<ReadRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
+                                      const IsolatedLimits& limits, const std::string& library,
+                                      const std::stop_token& stop) {
   const std::string file = path.string();
   const std::filesystem::path program = find_read_program(file);
   Pipe pipe = make_pipe();

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "itkbridge/transforms/transform_record.h"
+#include "itkbridge/transforms/read_record.h"
 
 namespace tetwarp {
 
@@ -31,8 +31,8 @@ struct IsolatedLimits {
 /// @param stop     ends the read at once
 /// @throws InputError with the words of the error that the reader threw, or naming library and file where it failed;
 /// Error where there is no tetwarp-read, or none that starts; Cancelled
-std::vector<TransformRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
-                                           const IsolatedLimits& limits, const std::string& library,
-                                           const std::stop_token& stop = {});
+std::vector<ReadRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
+                                      const IsolatedLimits& limits, const std::string& library,
+                                      const std::stop_token& stop = {});
 
 }  // namespace tetwarp

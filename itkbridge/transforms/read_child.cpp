@@ -40,13 +40,13 @@ class AnswerWriter {
     number(values.size());
     write(values.data(), values.size() * sizeof(values[0]));
   }
-  void records(const std::vector<TransformRecord>& records) const {
+  void records(const std::vector<ReadRecord>& records) const {
     answer(Answer::records);
     number(records.size());
-    for (const TransformRecord& record : records) {
-      array(record.type);
-      array(record.fixed);
-      array(record.parameters);
+    for (const ReadRecord& record : records) {
+      array(record.name);
+      array(record.head);
+      array(record.values);
     }
   }
 

@@ -9,14 +9,14 @@
 #include <string_view>
 #include <vector>
 
-#include "itkbridge/transforms/transform_record.h"
+#include "itkbridge/transforms/read_record.h"
 
 namespace tetwarp {
 
 /// A reader of the program, and the name by which it is chosen.
 struct ChildReader {
   std::string_view kind;
-  std::vector<TransformRecord> (*read)(const std::filesystem::path& path);
+  std::vector<ReadRecord> (*read)(const std::filesystem::path& path);
 };
 
 /// The main function of the program: confines this process, reads one file by one of the readers, and answers

@@ -26,7 +26,7 @@
 namespace tetwarp {
 namespace {
 
-using Records = std::vector<TransformRecord>;
+using Records = std::vector<ReadRecord>;
 
 constexpr IsolatedLimits kLimits = {.memory_bytes = std::size_t{128} << 20, .cpu_seconds = 60, .seconds = 60};
 
@@ -73,13 +73,13 @@ bool has_no_child() { return ::waitpid(-1, nullptr, WNOHANG) == -1 && errno == E
 TEST_F(IsolatedRead, ReturnsWhatWasReadWhateverItsSize) {
   const Records records = read("ramp", "1000000");
   ASSERT_EQ(records.size(), 2U);
-  EXPECT_EQ(records[0].type, "CompositeTransform_double_3_3");
-  EXPECT_TRUE(records[0].fixed.empty() && records[0].parameters.empty());
-  EXPECT_EQ(records[1].type, "BSplineTransform_double_3_3");
-  EXPECT_EQ(records[1].fixed, (std::vector<double>{1, 0, 3}));
-  EXPECT_TRUE(std::signbit(records[1].fixed[1]));
-  ASSERT_EQ(records[1].parameters.size(), 1'000'000U);
-  for (std::size_t n = 0; n < 1'000'000; n += 999) EXPECT_EQ(records[1].parameters[n], static_cast<double>(n) + 0.5);
+  EXPECT_EQ(records[0].name, "CompositeTransform_double_3_3");
+  EXPECT_TRUE(records[0].head.empty() && records[0].values.empty());
+  EXPECT_EQ(records[1].name, "BSplineTransform_double_3_3");
+  EXPECT_EQ(records[1].head, (std::vector<double>{1, 0, 3}));
+  EXPECT_TRUE(std::signbit(records[1].head[1]));
+  ASSERT_EQ(records[1].values.size(), 1'000'000U);
+  for (std::size_t n = 0; n < 1'000'000; n += 999) EXPECT_EQ(records[1].values[n], static_cast<double>(n) + 0.5);
   EXPECT_TRUE(has_no_child());
 }
 
@@ -132,7 +132,7 @@ TEST_F(IsolatedRead, WorksFromManyThreadsAtOnce) {
   std::vector<std::thread> threads;
   for (std::size_t n = 0; n < counts.size(); ++n) {
     threads.emplace_back([&counts, n] {
-      for (int turn = 0; turn < 4; ++turn) counts[n] += read("ramp", std::to_string(n * 1000))[1].parameters.size();
+      for (int turn = 0; turn < 4; ++turn) counts[n] += read("ramp", std::to_string(n * 1000))[1].values.size();
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -172,9 +172,9 @@ TEST_F(IsolatedRead, NoFileOfThisProcessIsInherited) {
   ::close(open);
   ::close(first);
   ASSERT_EQ(records.size(), 4U);
-  for (int n = 0; n < 3; ++n) EXPECT_EQ(records[n].type, "/dev/null");
-  EXPECT_TRUE(says(records[3].type, {"pipe:"}));
-  EXPECT_EQ(records[3].fixed, std::vector<double>{3});
+  for (int n = 0; n < 3; ++n) EXPECT_EQ(records[n].name, "/dev/null");
+  EXPECT_TRUE(says(records[3].name, {"pipe:"}));
+  EXPECT_EQ(records[3].head, std::vector<double>{3});
 }
 
 TEST_F(IsolatedRead, ReadsWhereDescriptorsOfTheStandardStreamsAreFree) {
@@ -189,7 +189,7 @@ TEST_F(IsolatedRead, ReadsWhereDescriptorsOfTheStandardStreamsAreFree) {
     ::close(kept[n]);
   }
   ASSERT_EQ(records.size(), 4U);
-  EXPECT_TRUE(says(records[3].type, {"pipe:"}));
+  EXPECT_TRUE(says(records[3].name, {"pipe:"}));
 }
 
 TEST_F(IsolatedRead, SignalsOfThisProcessAreNotInherited) {
@@ -201,7 +201,7 @@ TEST_F(IsolatedRead, SignalsOfThisProcessAreNotInherited) {
   ::signal(SIGXFSZ, handler);
   ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
   ASSERT_EQ(records.size(), 2U);
-  for (const TransformRecord& record : records) EXPECT_EQ(record.fixed, std::vector<double>{0}) << record.type;
+  for (const ReadRecord& record : records) EXPECT_EQ(record.head, std::vector<double>{0}) << record.name;
 }
 
 TEST_F(IsolatedRead, AStopEndsItAtOnce) {

@@ -21,14 +21,14 @@
 namespace {
 
 using tetwarp::InputError;
-using Records = std::vector<tetwarp::TransformRecord>;
+using Records = std::vector<tetwarp::ReadRecord>;
 using Path = std::filesystem::path;
 
 Records nothing(const Path&) { return {}; }
 
 Records ramp(const Path& count) {
-  tetwarp::TransformRecord record{"BSplineTransform_double_3_3", {1, -0.0, 3}, std::vector<double>(std::stoul(count))};
-  std::iota(record.parameters.begin(), record.parameters.end(), 0.5);
+  tetwarp::ReadRecord record{"BSplineTransform_double_3_3", {1, -0.0, 3}, std::vector<double>(std::stoul(count))};
+  std::iota(record.values.begin(), record.values.end(), 0.5);
   return {{"CompositeTransform_double_3_3", {}, {}}, record};
 }
 
