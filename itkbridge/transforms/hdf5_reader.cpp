@@ -99,7 +99,7 @@ class Hdf5Reader {
 
 }  // namespace
 
-std::vector<ReadRecord> read_hdf5_unconfined(const std::filesystem::path& path) {
+std::vector<ReadRecord> read_hdf5_unconfined(const std::filesystem::path& path, std::uint64_t) {
   try {
     H5::Exception::dontPrint();
     return Hdf5Reader(path).read();

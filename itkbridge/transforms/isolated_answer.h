@@ -17,9 +17,9 @@
 namespace tetwarp {
 
 /// The first bytes of an answer. The number changes with the format of answers, and with the arguments of the program:
-/// KIND FILE MEMORY_BYTES CPU_SECONDS SECONDS PARENT.
-inline constexpr std::string_view kReadGreeting = "tetwarp-read 1\n";
-inline constexpr int kReadArguments = 6;
+/// KIND FILE PART MEMORY_BYTES CPU_SECONDS SECONDS PARENT.
+inline constexpr std::string_view kReadGreeting = "tetwarp-read 2\n";
+inline constexpr int kReadArguments = 7;
 inline constexpr int kAnswerDescriptor = 3;
 
 enum class Answer : char { records, refusal, no_memory };

@@ -105,15 +105,15 @@ std::string ending(std::optional<int> status, const IsolatedLimits& limits) {
 
 }  // namespace
 
-std::vector<ReadRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
+std::vector<ReadRecord> read_isolated(const std::string& kind, const std::filesystem::path& path, std::uint64_t part,
                                       const IsolatedLimits& limits, const std::string& library,
                                       const std::stop_token& stop) {
   const std::string file = path.string();
   const std::filesystem::path program = find_read_program(file);
   Pipe pipe = make_pipe();
   ChildProcess child(program,
-                     {kind, file, std::to_string(limits.memory_bytes), std::to_string(limits.cpu_seconds),
-                      std::to_string(limits.seconds), std::to_string(::getpid())},
+                     {kind, file, std::to_string(part), std::to_string(limits.memory_bytes),
+                      std::to_string(limits.cpu_seconds), std::to_string(limits.seconds), std::to_string(::getpid())},
                      {.further = pipe.write.number()});
   pipe.write.close();
   const std::stop_callback at_once(stop, [&] { child.kill(); });

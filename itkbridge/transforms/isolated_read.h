@@ -5,6 +5,7 @@
 
 // Private to itkbridge/: reads files with libraries that damaged files can bring down.
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <stop_token>
 #include <string>
@@ -27,11 +28,12 @@ struct IsolatedLimits {
 /// memory, leaks included, goes with it. It has no file of this process open, and is no copy of it: other threads may
 /// do what they like, even use a device.
 /// @param kind     name of the reader that tetwarp-read is to use
+/// @param part     number of what is to be read, in files of several parts; the reader of the kind says which
 /// @param library  name of the library that reads, for messages
 /// @param stop     ends the read at once
 /// @throws InputError with the words of the error that the reader threw, or naming library and file where it failed;
 /// Error where there is no tetwarp-read, or none that starts; Cancelled
-std::vector<ReadRecord> read_isolated(const std::string& kind, const std::filesystem::path& path,
+std::vector<ReadRecord> read_isolated(const std::string& kind, const std::filesystem::path& path, std::uint64_t part,
                                       const IsolatedLimits& limits, const std::string& library,
                                       const std::stop_token& stop = {});
 

@@ -67,6 +67,7 @@ class AnswerWriter {
 struct Request {
   std::string_view kind;
   const char* file = nullptr;
+  std::uint64_t part = 0;
   std::uint64_t memory_bytes = 0;
   unsigned cpu_seconds = 0;
   unsigned seconds = 0;
@@ -84,8 +85,8 @@ bool parse(int argc, char** argv, Request& request) {
   if (argc != kReadArguments + 1) return false;
   request.kind = argv[1];
   request.file = argv[2];
-  return parse(argv[3], request.memory_bytes) && parse(argv[4], request.cpu_seconds) &&
-         parse(argv[5], request.seconds) && parse(argv[6], request.parent);
+  return parse(argv[3], request.part) && parse(argv[4], request.memory_bytes) && parse(argv[5], request.cpu_seconds) &&
+         parse(argv[6], request.seconds) && parse(argv[7], request.parent);
 }
 
 /// Bytes of memory of this process that can be written: what RLIMIT_DATA counts.
@@ -127,7 +128,7 @@ int answer_read(int argc, char** argv, std::span<const ChildReader> readers) {
   try {
     to.text(kReadGreeting);
     confine(request);
-    to.records(reader()->read(request.file));
+    to.records(reader()->read(request.file, request.part));
     end(0);
   } catch (const InputError& error) {
     to.answer(Answer::refusal);

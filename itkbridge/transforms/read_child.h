@@ -4,6 +4,7 @@
 #pragma once
 
 // Private to itkbridge/: the main function of tetwarp-read.
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string_view>
@@ -16,7 +17,8 @@ namespace tetwarp {
 /// A reader of the program, and the name by which it is chosen.
 struct ChildReader {
   std::string_view kind;
-  std::vector<ReadRecord> (*read)(const std::filesystem::path& path);
+  /// @param part  what `read_isolated` was asked for; of no meaning to a reader of whole files
+  std::vector<ReadRecord> (*read)(const std::filesystem::path& path, std::uint64_t part);
 };
 
 /// The main function of the program: confines this process, reads one file by one of the readers, and answers

@@ -11,7 +11,7 @@ namespace tetwarp {
 
 std::vector<TransformRecord> read_transform_hdf5(const std::filesystem::path& path, const std::stop_token& stop) {
   std::vector<TransformRecord> transforms;
-  for (ReadRecord& record : read_isolated("transform-hdf5", path, hdf5_limits(path), "HDF5", stop))
+  for (ReadRecord& record : read_isolated("transform-hdf5", path, 0, hdf5_limits(path), "HDF5", stop))
     transforms.push_back({std::move(record.name), std::move(record.head), std::move(record.values)});
   return transforms;
 }

@@ -56,7 +56,7 @@ class IsolatedRead : public testing::Test {
  protected:
   static Records read(const std::string& kind, const std::string& file = "FILE", const IsolatedLimits& limits = kLimits,
                       const std::stop_token& stop = {}) {
-    return read_isolated(kind, file, limits, "Library", stop);
+    return read_isolated(kind, file, 0, limits, "Library", stop);
   }
   static std::string why_not(const std::string& kind, const std::string& file = "FILE",
                              const IsolatedLimits& limits = kLimits) {
@@ -81,6 +81,14 @@ TEST_F(IsolatedRead, ReturnsWhatWasReadWhateverItsSize) {
   ASSERT_EQ(records[1].values.size(), 1'000'000U);
   for (std::size_t n = 0; n < 1'000'000; n += 999) EXPECT_EQ(records[1].values[n], static_cast<double>(n) + 0.5);
   EXPECT_TRUE(has_no_child());
+}
+
+TEST_F(IsolatedRead, ThePartThatIsAskedForIsRead) {
+  for (const std::uint64_t part : {0U, 7U}) {
+    const Records records = read_isolated("part", "FILE", part, kLimits, "Library");
+    ASSERT_EQ(records.size(), 1U);
+    EXPECT_EQ(records[0].head, std::vector<double>{static_cast<double>(part)});
+  }
 }
 
 TEST_F(IsolatedRead, WordsOfARefusalArrive) {
@@ -264,7 +272,7 @@ TEST_F(IsolatedRead, EndsWithTheProgramThatIsInterrupted) {
 
 TEST(IsolatedReadProgram, MissingIsAnErrorThatNamesIt) {
   const Variable none("TETWARP_READ_PROGRAM", "/none/tetwarp-read");
-  const std::string why = refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); });
+  const std::string why = refusal([] { read_isolated("nothing", "FILE", 0, kLimits, "Library"); });
   EXPECT_TRUE(says(why, {"tetwarp-read", "FILE", "TETWARP_READ_PROGRAM names /none/tetwarp-read"}));
   EXPECT_EQ(why.find("InputError"), std::string::npos) << "the file is not to blame: " << why;
 }
@@ -273,7 +281,7 @@ TEST(IsolatedReadProgram, OneThatCannotBeginIsNoFaultOfTheFile) {
   for (const auto& [program, word] :
        {std::pair<std::string, std::string>{"/bin/false", "status 1"}, {"/bin/true", "does not answer"}}) {
     const Variable named("TETWARP_READ_PROGRAM", program);
-    const std::string why = refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); });
+    const std::string why = refusal([] { read_isolated("nothing", "FILE", 0, kLimits, "Library"); });
     EXPECT_TRUE(says(why, {program, "FILE", word, "before it begins"}));
     EXPECT_EQ(why.find("InputError"), std::string::npos) << why;
   }
@@ -281,7 +289,7 @@ TEST(IsolatedReadProgram, OneThatCannotBeginIsNoFaultOfTheFile) {
   std::ofstream(scratch / "text") << "no program";
   std::filesystem::permissions(scratch / "text", std::filesystem::perms::owner_all);
   const Variable named("TETWARP_READ_PROGRAM", (scratch / "text").string());
-  EXPECT_TRUE(says(refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); }),
+  EXPECT_TRUE(says(refusal([] { read_isolated("nothing", "FILE", 0, kLimits, "Library"); }),
                    {(scratch / "text").string(), "cannot be started"}));
   EXPECT_TRUE(has_no_child());
 }
@@ -292,13 +300,13 @@ TEST(IsolatedReadProgram, OneThatSaysSomethingElseIsNotBelieved) {
     std::ofstream(scratch / "says") << "#!/bin/sh\nprintf '" + said + "' >&3\n";
     std::filesystem::permissions(scratch / "says", std::filesystem::perms::owner_all);
     const Variable named("TETWARP_READ_PROGRAM", (scratch / "says").string());
-    return refusal([] { read_isolated("nothing", "FILE", kLimits, "Library"); });
+    return refusal([] { read_isolated("nothing", "FILE", 0, kLimits, "Library"); });
   };
   const std::string older = why_of("tetwarp-read 0\\n\\002\\000\\000\\000");
   EXPECT_TRUE(says(older, {"FILE", "does not answer as this version expects"}));
   EXPECT_EQ(older.find("InputError"), std::string::npos) << older;
   // A refusal of so many letters that no memory holds them.
-  EXPECT_TRUE(says(why_of("tetwarp-read 1\\n\\001\\377\\377\\377\\377\\377\\377\\377\\177"),
+  EXPECT_TRUE(says(why_of("tetwarp-read 2\\n\\001\\377\\377\\377\\377\\377\\377\\377\\177"),
                    {"InputError", "Library cannot read FILE", "without a result"}));
 }
 

@@ -24,35 +24,38 @@ using tetwarp::InputError;
 using Records = std::vector<tetwarp::ReadRecord>;
 using Path = std::filesystem::path;
 
-Records nothing(const Path&) { return {}; }
+Records nothing(const Path&, std::uint64_t) { return {}; }
 
-Records ramp(const Path& count) {
+Records ramp(const Path& count, std::uint64_t) {
   tetwarp::ReadRecord record{"BSplineTransform_double_3_3", {1, -0.0, 3}, std::vector<double>(std::stoul(count))};
   std::iota(record.values.begin(), record.values.end(), 0.5);
   return {{"CompositeTransform_double_3_3", {}, {}}, record};
 }
 
-Records refusal(const Path& file) { throw InputError("7 values, " + file.string() + "; expected 8"); }
-Records other_exception(const Path&) { throw 3; }
-Records leaves(const Path&) { ::_exit(0); }
+/// The part that is asked for.
+Records part(const Path&, std::uint64_t number) { return {{"part", {static_cast<double>(number)}, {}}}; }
 
-Records signalled(const Path& signal) {
+Records refusal(const Path& file, std::uint64_t) { throw InputError("7 values, " + file.string() + "; expected 8"); }
+Records other_exception(const Path&, std::uint64_t) { throw 3; }
+Records leaves(const Path&, std::uint64_t) { ::_exit(0); }
+
+Records signalled(const Path& signal, std::uint64_t) {
   ::raise(std::stoi(signal));
   return {};
 }
 
-Records busy(const Path&) {
+Records busy(const Path&, std::uint64_t) {
   for (volatile bool forever = true; forever;) continue;
   return {};
 }
 
 /// Says which process it is, to whoever wants to know, and waits for ever.
-Records idle(const Path&) {
+Records idle(const Path&, std::uint64_t) {
   if (const char* file = std::getenv("TETWARP_TEST_READ_PROCESS")) std::ofstream(file) << ::getpid();
   for (;;) ::pause();
 }
 
-Records noise(const Path&) {
+Records noise(const Path&, std::uint64_t) {
   std::fprintf(stderr, "noise\n");
   std::printf("noise\n");
   std::fflush(stdout);
@@ -60,7 +63,7 @@ Records noise(const Path&) {
 }
 
 /// The descriptors that are open, each with what it is.
-Records descriptors(const Path&) {
+Records descriptors(const Path&, std::uint64_t) {
   Records records;
   for (int number = 0; number < 1024; ++number) {
     std::error_code closed;
@@ -73,7 +76,7 @@ Records descriptors(const Path&) {
 
 /// How many signals are blocked, and how many are ignored. 32 and 33 are the C library's own, which it ignores in every
 /// program that it starts.
-Records signals(const Path&) {
+Records signals(const Path&, std::uint64_t) {
   Records records;
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -87,11 +90,12 @@ Records signals(const Path&) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  constexpr tetwarp::ChildReader kReaders[] = {{"nothing", nothing}, {"ramp", ramp},
-                                               {"refusal", refusal}, {"other-exception", other_exception},
-                                               {"leaves", leaves},   {"signalled", signalled},
-                                               {"busy", busy},       {"idle", idle},
-                                               {"noise", noise},     {"descriptors", descriptors},
-                                               {"signals", signals}, {"transform-hdf5", idle}};
+  constexpr tetwarp::ChildReader kReaders[] = {{"nothing", nothing},    {"ramp", ramp},
+                                               {"refusal", refusal},    {"other-exception", other_exception},
+                                               {"leaves", leaves},      {"signalled", signalled},
+                                               {"busy", busy},          {"idle", idle},
+                                               {"noise", noise},        {"descriptors", descriptors},
+                                               {"signals", signals},    {"part", part},
+                                               {"transform-hdf5", idle}};
   return tetwarp::answer_read(argc, argv, kReaders);
 }
