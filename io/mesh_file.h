@@ -54,7 +54,7 @@ bool is_mesh_file(const std::filesystem::path& path);
 ///
 /// Options of the source, all of them optional:
 /// - displacement=NAME: the vectors that are displacements; otherwise the only vectors, or those called displacement,
-///   Displacement, U, u or DISP
+///   Displacement, U, u, DISP or DEPL
 /// - step=N: which of several time steps
 /// - deformed=FILE: a second mesh with the same vertices and cells, whose positions are the deformed ones
 /// - table=FILE: displacements by vertex number, a line each: number, ux, uy, uz

@@ -67,19 +67,35 @@ std::string listed(const MeshReader& reader, bool steps = false) {
   return text.empty() ? "; it has no vectors at its vertices" : text;
 }
 
+/// The names of the vectors that are called by one of some words; where none is, those whose short name is one.
+std::set<std::string> names_called(const MeshReader& reader, const std::set<std::string>& words) {
+  std::set<std::string> names, by_short_name;
+  for (const MeshVectors& array : reader.arrays) {
+    if (words.contains(array.name)) names.insert(array.name);
+    if (!array.short_name.empty() && words.contains(array.short_name)) by_short_name.insert(array.name);
+  }
+  return names.empty() ? by_short_name : names;
+}
+
 /// Chooses the vectors of the file that are the displacement; empty: that cannot be decided. @throws InputError for an
 /// option that fits no vectors
 std::optional<std::size_t> chosen_vectors(const MeshReader& reader, const FieldSource& source) {
-  std::set<std::string> names;
-  for (const MeshVectors& array : reader.arrays) names.insert(array.name);
-  std::string name = source.option("displacement");
-  require(name.empty() || names.contains(name),
-          "no vectors called \"" + name + "\" at the vertices of " + source.path.string() + listed(reader));
-  if (!source.options.contains("displacement") && names.size() > 1) names = usual_displacements(names);
-  if (!source.options.contains("displacement")) {
-    if (names.size() != 1) return {};
-    name = *names.begin();
+  std::set<std::string> names, words;
+  for (const MeshVectors& array : reader.arrays) {
+    names.insert(array.name);
+    words.insert({array.name, array.short_name});
   }
+  if (source.options.contains("displacement")) {
+    const std::string asked = source.option("displacement");
+    names = names_called(reader, {asked});
+    require(asked.empty() || names.size() == 1, (names.empty() ? "no vectors" : "several vectors") +
+                                                    (" called \"" + asked + "\" at the vertices of ") +
+                                                    source.path.string() + listed(reader));
+  } else if (names.size() > 1) {
+    names = names_called(reader, usual_displacements(words));
+  }
+  if (names.size() != 1) return {};
+  const std::string name = *names.begin();
   std::vector<std::size_t> found;
   for (std::size_t n = 0; n < reader.arrays.size(); ++n) {
     const MeshVectors& array = reader.arrays[n];

@@ -21,6 +21,8 @@ namespace tetwarp {
 struct MeshVectors {
   std::string name;
   std::optional<std::int64_t> step;  ///< step of time, where the format has steps
+  /// By which they can be asked for as well, where no name is that: DEPL of RESU____DEPL. Empty: none.
+  std::string short_name{};
 
   bool operator==(const MeshVectors&) const = default;
 };

@@ -9,7 +9,7 @@ namespace tetwarp {
 
 std::set<std::string> usual_displacements(const std::set<std::string>& names) {
   std::set<std::string> usual;
-  for (const char* known : {"displacement", "Displacement", "U", "u", "DISP"}) {
+  for (const char* known : {"displacement", "Displacement", "U", "u", "DISP", "DEPL"}) {
     if (names.contains(known)) usual.insert(known);
   }
   return usual;

@@ -13,7 +13,7 @@
 
 namespace tetwarp {
 
-/// Those of the names that a displacement usually has: displacement, Displacement, U, u, DISP.
+/// Those of the names that a displacement usually has: displacement, Displacement, U, u, DISP, DEPL.
 std::set<std::string> usual_displacements(const std::set<std::string>& names);
 
 /// Finds the frame or the units of a file: what the file states, else the option, else what is assumed.
