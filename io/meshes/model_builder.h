@@ -3,7 +3,7 @@
 
 #pragma once
 
-// Private to io/. What the formats of Abaqus, CalculiX and FEBio have in common.
+// Private to io/. What the formats of Abaqus, CalculiX, FEBio and MED have in common.
 #include <cstdint>
 #include <map>
 #include <span>
@@ -25,8 +25,8 @@ class ModelBuilder {
   /// @param nodes   numbers of the corners in the order of Abaqus, whose first triangle of a wedge looks inwards
   /// @param curved  whether the element has further nodes, which are left out
   void add_element(std::int64_t number, CellShape shape, std::span<const std::int64_t> nodes, bool curved);
-  /// Counts an element without a volume.
-  void leave_out(const std::string& type) { ++left_out_[type]; }
+  /// Counts elements without a volume.
+  void leave_out(const std::string& type, std::uint64_t count = 1) { left_out_[type] += count; }
 
   /// Puts all of it into a reader. @throws InputError for a node or an element that is there twice, a number below 1,
   /// or a node of an element that does not exist

@@ -3,10 +3,12 @@
 
 // The program tetwarp-read. It reads a file, by a library that damaged files can bring down, for the process that
 // starts it (itkbridge/transforms/isolated_read.h).
+#include "itkbridge/meshes/med_reader.h"
 #include "itkbridge/transforms/hdf5_reader.h"
 #include "itkbridge/transforms/read_child.h"
 
 int main(int argc, char** argv) {
-  constexpr tetwarp::ChildReader kReaders[] = {{"transform-hdf5", tetwarp::read_hdf5_unconfined}};
+  constexpr tetwarp::ChildReader kReaders[] = {{"transform-hdf5", tetwarp::read_hdf5_unconfined},
+                                               {"mesh-med", tetwarp::read_med_unconfined}};
   return tetwarp::answer_read(argc, argv, kReaders);
 }
