@@ -6,8 +6,9 @@
 
     register.py METHOD MOVING FIXED RESULT.mha
 
-METHOD: plastimatch, elastix (programs); itk-elastix, simpleitk-demons, simpleitk-bspline, ants (antspyx) (packages of Python);
-gradient (Tetwarp's own: examples/learning/register.py, wants PyTorch and the package tetwarp).
+METHOD: plastimatch, elastix (programs); niftyreg (its programs, and the package tetwarp, which reads what they write); itk-elastix,
+simpleitk-demons, simpleitk-bspline, ants (antspyx) (packages of Python); gradient (Tetwarp's own: examples/learning/register.py,
+wants PyTorch and the package tetwarp).
 RESULT gets the displacement from fixed to moving at each voxel of FIXED, LPS mm, as `tetwarp score` takes it.
 """
 
@@ -102,6 +103,17 @@ def elastix(moving: str, fixed: str, result: str) -> None:
         shutil.copy(pathlib.Path(folder) / "deformationField.mha", result)
 
 
+def niftyreg(moving: str, fixed: str, result: str) -> None:
+    """reg_f3d with its defaults: B-splines in three resolutions, normalised mutual information."""
+    import tetwarp
+
+    with tempfile.TemporaryDirectory() as folder:
+        spline, warped, field = (f"{folder}/{name}.nii.gz" for name in ("spline", "warped", "field"))
+        run("reg_f3d", "-ref", fixed, "-flo", moving, "-cpp", spline, "-res", warped)
+        run("reg_transform", "-ref", fixed, "-disp", spline, field)
+        tetwarp.write_field(tetwarp.read_field(field), result)
+
+
 def itk_elastix(moving: str, fixed: str, result: str) -> None:
     """The default maps of itk-elastix: rigid, affine, B-splines."""
     import itk
@@ -184,6 +196,7 @@ def gradient(moving: str, fixed: str, result: str) -> None:
 METHODS: dict[str, Callable[[str, str, str], None]] = {
     "plastimatch": plastimatch,
     "elastix": elastix,
+    "niftyreg": niftyreg,
     "itk-elastix": itk_elastix,
     "simpleitk-demons": simpleitk_demons,
     "simpleitk-bspline": simpleitk_bspline,
