@@ -38,7 +38,7 @@ for suite in "${suites[@]}"; do
   cp "$wheels"/*.whl "$root/try/wheels"
   mkdir -p "$root/try/python" "$root/try/examples" "$root/try/tests"
   cp -r "$source_dir/python/tests" "$root/try/python"
-  cp -r "$source_dir/tests/view" "$root/try/tests"
+  cp -r "$source_dir/tests/view" "$source_dir/tests/formats" "$root/try/tests"
   cp -r "$source_dir/examples/scenarios" "$root/try/examples"
   chroot "$root" python3 -m venv /try/venv
   chroot "$root" /try/venv/bin/pip install -q --no-index --find-links /try/wheels tetwarp
