@@ -30,7 +30,7 @@ def _case(request, monkeypatch):
 def _field(case):
     like = tw.read("../fixed.nii.gz")
     files = [file.partition(":") for file in case["pull_field"]]
-    by_itk = any(name.endswith((".h5", ".toml", ".mat")) and "tool=" not in options for name, _, options in files)
+    by_itk = any(name.endswith((".h5", ".toml", ".mat", ".txt")) and "tool=" not in options for name, _, options in files)
     if by_itk and not tw.features()["itk_transforms"]:
         pytest.skip("a build without ITK")
     return tw.read_field(case["pull_field"], like=like, direction="pull")
