@@ -208,10 +208,10 @@ class XpltReader final : public MeshReader {
 
   /// A name of 64 bytes, or with its length before it.
   static std::string name_in(const std::vector<std::uint32_t>& words) {
+    if (words.empty()) return {};
     std::string text(words.size() * sizeof(std::uint32_t), '\0');
     std::memcpy(text.data(), words.data(), text.size());
-    if (!words.empty() && words[0] <= text.size() - sizeof(std::uint32_t))
-      text = text.substr(sizeof(std::uint32_t), words[0]);
+    if (words[0] <= text.size() - sizeof(std::uint32_t)) text = text.substr(sizeof(std::uint32_t), words[0]);
     text.resize(std::min(text.find('\0'), text.size()));
     return text;
   }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "deform/errors.h"
@@ -42,11 +43,44 @@ std::optional<std::vector<double>> numbers_of(const toml::array& array) {
   return numbers;
 }
 
-/// A node as TOML writes it, for messages: no reader of transforms takes it.
+/// What stands in messages for a node that no reader of transforms takes: "an array", "a table". toml++ could write the
+/// node, but converts what it cannot on the way: the logarithm of a number below 1 to a size.
 std::string text_of(const toml::node& node) {
   std::ostringstream text;
-  node.visit([&](const auto& value) { text << value; });
+  text << (node.is_array() ? "an " : "a ") << node.type();
   return text.str();
+}
+
+/// Refuses characters beyond ASCII outside of strings and comments, where TOML has none, and strings of several lines,
+/// which elastix does not write. toml++ 3.3 has no defined behaviour where it looks for blanks among such characters.
+void require_ascii_outside_strings(std::string_view text, const std::string& file) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::int64_t line = 1;
+  bool comment = false;
+  char quote = 0;  // that of the string in which a character stands
+  const auto where = [&] { return " in line " + std::to_string(line) + " of " + file; };
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == '\n') {
+      ++line;
+      comment = false;
+      quote = 0;
+    } else if (quote != 0) {
+      if (c == '\\' && quote == '"') {
+        ++at;
+      } else if (c == quote) {
+        quote = 0;
+      }
+    } else if (!comment && (c == '"' || c == '\'')) {
+      require(text.substr(at, 3) != std::string(3, c), [&] { return "a string of several lines" + where(); });
+      quote = c;
+    } else if (!comment) {
+      comment = c == '#';
+      require(static_cast<unsigned char>(c) < 0x80,
+              [&] { return "a character that is not ASCII outside of a string" + where(); });
+    }
+  }
 }
 
 }  // namespace
@@ -84,9 +118,11 @@ void ParameterFile::read_text(const std::filesystem::path& path) {
 
 void ParameterFile::read_toml(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
+  const std::string all(std::istreambuf_iterator<char>(stream), {});
+  require_ascii_outside_strings(all, file_);
   toml::table table;
   try {
-    table = toml::parse(stream, file_);
+    table = toml::parse(all, file_);
   } catch (const toml::parse_error& error) {
     throw InputError("line " + std::to_string(error.source().begin.line) + " of " + file_ +
                      " is no TOML: " + std::string(error.description()) + "; the file may be truncated");
@@ -95,7 +131,7 @@ void ParameterFile::read_toml(const std::filesystem::path& path) {
     Value value;
     if (const auto* array = node.as_array()) {
       value.numbers = numbers_of(*array);
-      if (!value.numbers) value.text = text_of(*array);
+      if (!value.numbers) value.text = text_of(node);
     } else if (const auto number = node.value<double>(); node.is_number() && number) {
       value.numbers = std::vector<double>{*number};
       value.text = node.is_integer() ? std::to_string(*node.value<std::int64_t>()) : std::to_string(*number);

@@ -170,6 +170,22 @@ TEST(ElastixParameters, WordsOfTomlAreNoNumbers) {
   EXPECT_EQ(read("[3, 5, 7]", "[3.0, 5, 7]"), "");
   EXPECT_TRUE(says(read("[3, 5, 7]", "[\"three\", 5, 7]"), {"where a number is expected", "a.toml"}));
   EXPECT_TRUE(says(read("[3, 5, 7]", "1979-05-27"), {"where a number is expected", "a.toml"}));
+  EXPECT_TRUE(says(read("[3, 5, 7]", "[3, [0.05], 7]"), {"where a number is expected", "a.toml"}));
+}
+
+TEST(ElastixParameters, CharactersBeyondAsciiStandInStringsAndCommentsAlone) {
+  const Scratch scratch;
+  const auto read = [&](const std::string& text) {
+    write_file(scratch / "a.toml", "\xEF\xBB\xBFSize = [3, 5, 7]  # \xC3\xA9 '\n" + text);
+    return refusal([&] { read_transform_file(scratch / "a.toml"); });
+  };
+  const std::string no_transform = read("");
+  EXPECT_TRUE(says(no_transform, {"a.toml"}));
+  for (const char* taken : {"a = \"\xC3\xA9\"\n", "a = '\xC3\xA9'\n", "a = \"\\\"\xC3\xA9\"\n"})
+    EXPECT_EQ(read(taken), no_transform) << taken;
+  for (const char* refused : {"\xC5\x96 = 3\n", "a = \xEF\xB3\xBF\n", "a = \"\" \xC3\xA9\n", "a = \"\\\\\" \xC3\xA9\n"})
+    EXPECT_TRUE(says(read(refused), {"line 2", "a.toml", "not ASCII"})) << refused;
+  EXPECT_TRUE(says(read("a = \"\"\"b\"c\"\"\" \xC3\xA9\n"), {"line 2", "several lines"}));
 }
 
 /// Where transformix moves points, or nothing where it is not installed.
