@@ -111,7 +111,7 @@ def niftyreg(moving: str, fixed: str, result: str) -> None:
         spline, warped, field = (f"{folder}/{name}.nii.gz" for name in ("spline", "warped", "field"))
         run("reg_f3d", "-ref", fixed, "-flo", moving, "-cpp", spline, "-res", warped)
         run("reg_transform", "-ref", fixed, "-disp", spline, field)
-        tetwarp.write_field(tetwarp.read_field(field), result)
+        tetwarp.write_field(tetwarp.read_field(field, direction="pull"), result)
 
 
 def itk_elastix(moving: str, fixed: str, result: str) -> None:
