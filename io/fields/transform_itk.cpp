@@ -34,9 +34,7 @@ const char* name_of(TransformTool tool) {
 /// @param path  the file to read, for the message where the module is missing
 template <class Function>
 Function* in_module(const char* name, const std::filesystem::path& path) {
-  auto* const function = reinterpret_cast<Function*>(find_in_module(TETWARP_TRANSFORM_MODULE, name));
-  if (!function) refuse_without_module("transform files", TETWARP_TRANSFORM_MODULE, path.string(), "");
-  return function;
+  return function_in_module<Function>(TETWARP_TRANSFORM_MODULE, name, "transform files", path.string());
 }
 
 TransformFile read(const FieldSource& source, const std::stop_token& stop) {

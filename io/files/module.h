@@ -25,4 +25,14 @@ void* find_in_module(const char* module, const char* function);
 [[noreturn]] void refuse_without_module(const std::string& what, const std::string& module, const std::string& path,
                                         const std::string& otherwise);
 
+/// Finds a function of a module as `find_in_module` does. @tparam Function  its type; the other parameters are those of
+/// both functions above. @throws NotCompiled where it is not found
+template <class Function>
+Function* function_in_module(const char* module, const char* function, const std::string& what, const std::string& path,
+                             const std::string& otherwise = "") {
+  auto* const found = reinterpret_cast<Function*>(find_in_module(module, function));
+  if (!found) refuse_without_module(what, module, path, otherwise);
+  return found;
+}
+
 }  // namespace tetwarp

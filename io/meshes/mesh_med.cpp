@@ -71,9 +71,7 @@ std::string text_of(double number) {
 /// A function of the module that reads HDF5.
 template <class Function>
 Function* in_module(const char* name, const std::filesystem::path& path) {
-  auto* const function = reinterpret_cast<Function*>(find_in_module(TETWARP_TRANSFORM_MODULE, name));
-  if (!function) refuse_without_module("MED files", TETWARP_TRANSFORM_MODULE, path.string(), "");
-  return function;
+  return function_in_module<Function>(TETWARP_TRANSFORM_MODULE, name, "MED files", path.string());
 }
 
 /// The short name of a field of Code_Aster, which calls it by the name of a result, made 8 long by "_", and of the

@@ -10,10 +10,8 @@ namespace tetwarp {
 
 std::unique_ptr<VtkFile> open_vtk_xml(const std::filesystem::path& path) {
   using Open = VtkFile*(const char*);
-  static Open* const open = reinterpret_cast<Open*>(find_in_module(TETWARP_VTK_MODULE, "tetwarp_open_vtk_xml"));
-  if (!open) {
-    refuse_without_module("XML files of VTK", TETWARP_VTK_MODULE, path.string(), ", or write a legacy file (.vtk)");
-  }
+  static Open* const open = function_in_module<Open>(TETWARP_VTK_MODULE, "tetwarp_open_vtk_xml", "XML files of VTK",
+                                                     path.string(), ", or write a legacy file (.vtk)");
   return std::unique_ptr<VtkFile>(open(path.c_str()));
 }
 
