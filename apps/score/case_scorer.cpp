@@ -103,7 +103,7 @@ CaseScore CaseScorer::score(const FieldSource& results, const FieldSource* back,
       require(result->options.empty(), score.file.string() + " holds points, which take no options");
       score_points(one, score);
     } else {
-      score_field(results, back, one, score);
+      score_field(results, *result, back, one, score);
     }
     score.checks = check(score, limits);
   } catch (const InputError& error) {  // one bad file does not lose what came of the others
@@ -239,15 +239,14 @@ void CaseScorer::score_triples(const FieldSource& results, const TruthCase& one,
   }
 }
 
-void CaseScorer::score_field(const FieldSource& results, const FieldSource* back, const TruthCase& one,
-                             CaseScore& score) const {
+void CaseScorer::score_field(const FieldSource& results, const FieldSource& file, const FieldSource* back,
+                             const TruthCase& one, CaseScore& score) const {
   Stage stage(options_.common, one.name);
   const Control control = stage.control();
   const Side side = side_of(one);
   const Geometry& grid = side.grid();
   const Geometry &moving = moving_.ct->geometry(), &fixed = options_.forward ? side.other : grid;
-  const PullField result =
-      sampled(read_result(*result_of(results, set_, one), grid, options_.forward, score.notes, control), grid, control);
+  const PullField result = sampled(read_result(file, grid, options_.forward, score.notes, control), grid, control);
 
   const ForwardChoice choice = parse_forward_fields({one.field.string()}, {}, options_.common.nifti_frame);
   const VertexField field = read_field(choice, moving, options_.common.threads, control).field;

@@ -44,7 +44,9 @@ class CaseScorer {
                         const Control& control) const;
   /// A result at every voxel of a grid.
   PullField sampled(PullField field, const Geometry& grid, const Control& control) const;
-  void score_field(const FieldSource& results, const FieldSource* back, const TruthCase& one, CaseScore& score) const;
+  /// @param file  the result among `results`
+  void score_field(const FieldSource& results, const FieldSource& file, const FieldSource* back, const TruthCase& one,
+                   CaseScore& score) const;
   void score_landmarks(const TruthCase& one, const Side& side, const PullField& result, CaseScore& score) const;
   void score_points(const TruthCase& one, CaseScore& score) const;
   void score_labels(const Side& side, const PullField& result, CaseScore& score, const Control& control) const;
