@@ -101,8 +101,7 @@ const char* const kFieldHelp =
     ".mat .toml), NiftyReg and FSL (their B-splines), FreeSurfer (.lta) or a 4 x 4 matrix "
     "(.mat:tool=greedy|c3d|niftyreg|mrtrix|flirt), each vertex x goes to T(x), an affine one with invert=yes to where "
     "the inverse leads, a mesh (.msh .vtu .vtk .frd .xplt .med .inp, with displacement=NAME and step=N, deformed=FILE, "
-    "or "
-    "table=FILE; the first of several), or identity, wave:amplitude=,wavelength=[,phase=,axis=,along=], "
+    "or table=FILE; the first of several), or identity, wave:amplitude=,wavelength=[,phase=,axis=,along=], "
     "twist:angle=[,axis=], bubble:radius=,strength=[,center=X/Y/Z], bubble-paper:shift=[,center=], "
     "elastic:amplitude=,spacing=,seed=, translate:by=X/Y/Z; mm, or voxels with the suffix vox; degrees. Options stand "
     "behind a name as after .npy. Several compose, the first is applied first";

@@ -17,9 +17,8 @@ namespace tetwarp {
 ///   - name of the mesh; head: the three numbers of the version, how many records of cells follow; values: coordinates,
 ///     all x, then all y, then all z
 ///   - "mm", "m" or nothing: the stated unit; values: numbers of the nodes, where the file has them
-///   - for each type of cells its name ("TE4"); head: number of cells; values: the first node of all cells, counted
-///   from
-///     1, then the second of all, ...; none of polygons and polyhedra
+///   - for each type of cells its name ("TE4"); head: number of cells; values: nodes, counted from 1, the first of all
+///     cells, then the second of all, ...; none of polygons and polyhedra
 ///   - for each step of each field that is taken for vectors its name; head: step, iteration, number of components
 ///
 ///   n: of the field number n - 1 in that list, for each part of the nodes (a profile) two records:

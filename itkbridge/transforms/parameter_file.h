@@ -33,7 +33,7 @@ class ParameterFile {
 
  private:
   struct Value {
-    std::string text;  ///< as it stands in the file, strings with quotes
+    std::string text;  ///< as it stands in the file, strings with quotes; of TOML that no reader takes its kind
     /// Those of TOML; of an array there is no text then.
     std::optional<std::vector<double>> numbers = {};
   };
