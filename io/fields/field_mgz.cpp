@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "deform/errors.h"
+#include "io/files/gzip_inflate.h"
 #include "io/images/image_reader.h"
 #include "io/lower_case.h"
 #include "io/ras.h"
@@ -205,7 +206,7 @@ Warp read_warp(const std::filesystem::path& path) {
   const glm::dmat3 cosines = read_cosines(bytes);
   warp.grid = geometry_of(size, spacing, cosines, bytes.vector());
   require_valid(warp.grid, file);
-  const double held = 1040.0 * static_cast<double>(std::filesystem::file_size(path));  // deflate makes 1032 of one
+  const double held = kDeflateAtMost * static_cast<double>(std::filesystem::file_size(path));
   require(static_cast<double>(vector_bytes(warp.grid)) <= held, "a header that promises too much, " + file);
   bytes.skip(kDataOffset - kHeaderBytes + vector_bytes(warp.grid) + kScanBytes);
   read_tags(bytes, file, warp);

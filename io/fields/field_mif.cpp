@@ -223,7 +223,6 @@ void parse_offset(const HeaderText& text, const std::string& file, Warp& warp) {
 
 /// Refuses a header that promises more values than the file can hold, and bytes behind the values.
 void require_holds(const Warp& warp, bool packed, const std::filesystem::path& path) {
-  constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
   const std::string file = path.string(), values = to_string(warp.grid.size) + " x 3 x " + to_string(warp.order.type);
   const double expected = 3.0 * static_cast<double>(size_bytes(warp.order.type)) *
                           static_cast<double>(warp.grid.size.x) * static_cast<double>(warp.grid.size.y) *

@@ -17,6 +17,9 @@ namespace tetwarp {
 /// was opened. Many threads may call it at a time, in any order.
 using PlainBytes = std::function<bool(std::uint64_t offset, std::span<std::byte> bytes)>;
 
+/// How many plain bytes a compressed byte can become, at most: deflate cannot do better than 1032.
+constexpr double kDeflateAtMost = 1040;
+
 /// The most plain bytes that are kept in memory beside the caller's.
 constexpr std::uint64_t kInflateAtMost = std::uint64_t{1} << 30;
 

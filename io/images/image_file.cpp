@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "deform/errors.h"
+#include "io/files/gzip_inflate.h"
 #include "io/images/image_reader.h"
 #include "io/images/image_writer.h"
 #include "io/images/mha_header.h"
@@ -26,7 +27,6 @@ namespace {
 /// A header that promises more voxels than the file can hold is not believed: nothing is allocated for it. Nor is one
 /// that leaves bytes over, where the voxels are stored as they are: it is about another volume, or the file is damaged.
 void require_file_holds(const std::filesystem::path& path, const ImageHeader& header, const StoredVoxels& stored) {
-  constexpr double kDeflateAtMost = 1040;  // deflate cannot do better than 1032 to 1
   double expected = static_cast<double>(header.components) * static_cast<double>(stored.value_bytes);
   for (int axis = 0; axis < 3; ++axis) expected *= static_cast<double>(header.geometry.size[axis]);
   const auto offset = static_cast<double>(stored.offset);
