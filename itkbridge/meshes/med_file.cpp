@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "deform/errors.h"
-#include "itkbridge/transforms/hdf5_limits.h"
-#include "itkbridge/transforms/isolated_read.h"
+#include "itkbridge/isolated/hdf5_limits.h"
+#include "itkbridge/isolated/isolated_read.h"
 
 namespace tetwarp {
 namespace {

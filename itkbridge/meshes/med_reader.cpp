@@ -14,7 +14,7 @@
 #include <string_view>
 
 #include "deform/errors.h"
-#include "itkbridge/transforms/hdf5_list.h"
+#include "itkbridge/isolated/hdf5_list.h"
 
 namespace tetwarp {
 namespace {

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "deform/errors.h"
-#include "itkbridge/transforms/hdf5_list.h"
+#include "itkbridge/isolated/hdf5_list.h"
 
 namespace tetwarp {
 namespace {

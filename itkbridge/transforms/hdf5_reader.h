@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "itkbridge/transforms/read_record.h"
+#include "itkbridge/isolated/read_record.h"
 
 namespace tetwarp {
 

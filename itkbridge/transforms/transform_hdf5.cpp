@@ -3,8 +3,8 @@
 
 #include <utility>
 
-#include "itkbridge/transforms/hdf5_limits.h"
-#include "itkbridge/transforms/isolated_read.h"
+#include "itkbridge/isolated/hdf5_limits.h"
+#include "itkbridge/isolated/isolated_read.h"
 #include "itkbridge/transforms/transform_record.h"
 
 namespace tetwarp {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/transforms/isolated_read.h"
+#include "itkbridge/isolated/isolated_read.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

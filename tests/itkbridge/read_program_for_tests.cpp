@@ -16,7 +16,7 @@
 #include <string>
 
 #include "deform/errors.h"
-#include "itkbridge/transforms/read_child.h"
+#include "itkbridge/isolated/read_child.h"
 
 namespace {
 

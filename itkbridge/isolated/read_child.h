@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "itkbridge/transforms/read_record.h"
+#include "itkbridge/isolated/read_record.h"
 
 namespace tetwarp {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "itkbridge/transforms/isolated_read.h"
+#include "itkbridge/isolated/isolated_read.h"
 
 namespace tetwarp {
 

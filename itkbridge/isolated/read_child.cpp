@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/transforms/read_child.h"
+#include "itkbridge/isolated/read_child.h"
 
 #include <fcntl.h>
 #include <sys/prctl.h>
@@ -20,7 +20,7 @@
 
 #include "deform/errors.h"
 #include "deform/text/text_number.h"
-#include "itkbridge/transforms/isolated_answer.h"
+#include "itkbridge/isolated/isolated_answer.h"
 
 namespace tetwarp {
 namespace {

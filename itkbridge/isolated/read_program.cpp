@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/transforms/read_program.h"
+#include "itkbridge/isolated/read_program.h"
 
 #include <dlfcn.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/transforms/isolated_read.h"
+#include "itkbridge/isolated/isolated_read.h"
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -14,8 +14,8 @@
 
 #include "deform/errors.h"
 #include "itkbridge/child_process.h"
-#include "itkbridge/transforms/isolated_answer.h"
-#include "itkbridge/transforms/read_program.h"
+#include "itkbridge/isolated/isolated_answer.h"
+#include "itkbridge/isolated/read_program.h"
 
 namespace tetwarp {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "itkbridge/transforms/read_record.h"
+#include "itkbridge/isolated/read_record.h"
 
 namespace tetwarp {
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/transforms/hdf5_limits.h"
+#include "itkbridge/isolated/hdf5_limits.h"
 
 #include <algorithm>
 

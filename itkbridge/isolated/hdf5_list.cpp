@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "itkbridge/transforms/hdf5_list.h"
+#include "itkbridge/isolated/hdf5_list.h"
 
 #include <algorithm>
 
 #include "deform/errors.h"
-#include "itkbridge/transforms/hdf5_limits.h"
+#include "itkbridge/isolated/hdf5_limits.h"
 
 namespace tetwarp {
 namespace {
