@@ -140,12 +140,16 @@ TEST(BenchProgram, AMissedFloorIsAFailureWhereItIsAskedFor) {
   const Scratch scratch;
   const std::string alone = std::string(kTinyCpu) + "--peers none --cell-sizes none --fields ";
   EXPECT_EQ(run_bench(scratch, alone + "identity").status, 0);
-  // 8192 voxels are moved in microseconds: no new field is made in twice that
-  const Outcome missed = run_bench(scratch, alone + "identity --check");
-  EXPECT_EQ(missed.status, 1);
-  EXPECT_TRUE(says(missed.err, {"a floor is missed"}));
-  EXPECT_TRUE(says(missed.out, {"at most 2, missed"}));
-  EXPECT_TRUE(says(read_text(scratch / "r.json"), {"floors"}));
+  // 8192 voxels are moved in microseconds: seldom is a new field made in twice that.
+  bool missed = false;
+  for (int turn = 0; turn < 20 && !missed; ++turn) {
+    const Outcome run = run_bench(scratch, alone + "identity --check");
+    missed = says(run.out, {"at most 2, missed"});
+    EXPECT_EQ(run.status, missed ? 1 : 0) << run.out;
+    EXPECT_EQ(bool(says(run.err, {"a floor is missed"})), missed) << run.err;
+    EXPECT_TRUE(says(read_text(scratch / "r.json"), {"floors"}));
+  }
+  EXPECT_TRUE(missed);
   EXPECT_EQ(run_bench(scratch, alone + "local --check").status, 0) << "nothing is required of it";
 }
 
