@@ -2,14 +2,15 @@
 # SPDX-FileCopyrightText: The Tetwarp authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What `tetwarp score` says of overlaps, surfaces and doses is what plastimatch measures.
+"""What `tetwarp score` says of overlaps, surfaces and doses is what plastimatch measures, and of landmarks what elastix does.
 
-    check_scores.py TETWARP        status 77: plastimatch is missing
+    check_scores.py TETWARP        status 77: plastimatch or elastix is missing
 
-The "registration" is a shift of all by 4, 3 and 2 mm, which is off by several voxels. Labels and doses are compared that Tetwarp takes
+The "registration" is a shift of all, which is off by several voxels. Labels and doses are compared that Tetwarp takes
 along by it; the label does not touch the ends of the grid, where plastimatch sees a surface and Tetwarp does not.
 """
 
+import csv
 import json
 import pathlib
 import re
@@ -21,6 +22,42 @@ import tempfile
 LABEL = 9  # the spleen of the phantom
 KIND = "elastic:amplitude=9,spacing=70"
 CASE = "elastic-amplitude-9-spacing-70"
+SHIFT = (3.75, 2.5, 2.5)  # quarters and halves of a voxel: the grid on which vertices lie has them
+# One step, of which elastix prints what its metrics were before it.
+ELASTIX_MAP = """(FixedImageDimension 3)
+(MovingImageDimension 3)
+(FixedInternalImagePixelType "float")
+(MovingInternalImagePixelType "float")
+(UseDirectionCosines "true")
+(Registration "MultiMetricMultiResolutionRegistration")
+(Interpolator "LinearInterpolator")
+(ResampleInterpolator "FinalBSplineInterpolator")
+(Resampler "DefaultResampler")
+(FixedImagePyramid "FixedSmoothingImagePyramid")
+(MovingImagePyramid "MovingSmoothingImagePyramid")
+(Optimizer "RegularStepGradientDescent")
+(Transform "TranslationTransform")
+(Metric "AdvancedMeanSquares" "CorrespondingPointsEuclideanDistanceMetric")
+(Metric0Weight 0.0)
+(Metric1Weight 1.0)
+(NumberOfResolutions 1)
+(MaximumNumberOfIterations 1)
+(ImageSampler "Full")
+(AutomaticTransformInitialization "false")
+(HowToCombineTransforms "Compose")
+(WriteResultImage "false")
+"""
+ELASTIX_SHIFT = f"""(Transform "TranslationTransform")
+(NumberOfParameters 3)
+(TransformParameters {SHIFT[0]} {SHIFT[1]} {SHIFT[2]})
+(InitialTransformParametersFileName "NoInitialTransform")
+(HowToCombineTransforms "Compose")
+(FixedImageDimension 3)
+(MovingImageDimension 3)
+(FixedInternalImagePixelType "float")
+(MovingInternalImagePixelType "float")
+(UseDirectionCosines "true")
+"""
 
 
 def run(*words: object, folder: pathlib.Path) -> str:
@@ -35,9 +72,25 @@ def number(pattern: str, text: str) -> float:
     return float(found.group(1))
 
 
-def near(ours: float, theirs: float, most: float, what: str) -> None:
-    print(f"{what}: {ours:.5f}, plastimatch {theirs:.5f}")
+def near(ours: float, theirs: float, most: float, what: str, program: str = "plastimatch") -> None:
+    print(f"{what}: {ours:.5f}, {program} {theirs:.5f}")
     assert abs(ours - theirs) <= most, what
+
+
+def landmarks_by_elastix(folder: pathlib.Path) -> float:
+    """The mean distance between landmarks of the fixed volume taken to the moving one, and those of the moving volume."""
+    taken, there = (list(csv.DictReader((folder / "set" / at / "landmarks.csv").open())) for at in (CASE, "moving"))
+    known = [pair for pair in zip(taken, there) if pair[0]["status"] == "moved"]
+    for name, points in (("fixed.txt", [pair[0] for pair in known]), ("moving.txt", [pair[1] for pair in known])):
+        lines = [" ".join(point[axis] for axis in "xyz") for point in points]
+        (folder / name).write_text("\n".join(["point", str(len(lines)), *lines, ""]))
+    (folder / "map.txt").write_text(ELASTIX_MAP)
+    (folder / "shift.txt").write_text(ELASTIX_SHIFT)
+    (folder / "elastix").mkdir()
+    run("elastix", "-f", f"set/{CASE}/fixed.nii.gz", "-m", "set/moving/moving.nii.gz", "-p", "map.txt", "-t0", "shift.txt",
+        "-fp", "fixed.txt", "-mp", "moving.txt", "-out", "elastix", folder=folder)
+    with open(folder / "elastix" / "IterationInfo.0.R0.txt", newline="") as file:
+        return float(next(csv.DictReader(file, delimiter="\t"))["2:Metric1"])
 
 
 def check(program: str, folder: pathlib.Path) -> None:
@@ -52,10 +105,11 @@ def check(program: str, folder: pathlib.Path) -> None:
     plastimatch("threshold", "--input", "labels.nii.gz", "--output", "part.mha", "--range", f"{LABEL - 0.5},{LABEL + 0.5}")
     plastimatch("filter", "--pattern", "gauss", "--gauss-width", "60", "--output", "dose.mha", "part.mha")
     tetwarp("truth", "ct.nii.gz", "-o", "set", "--labels", "labels.nii.gz", "--case", KIND, "--dose", "dose.mha")
-    tetwarp("invert", "translate:by=-4/-3/-2", "--like", f"set/{CASE}/fixed.nii.gz", "-o", "shift.mha")
+    tetwarp("invert", "translate:by=" + "/".join(str(-by) for by in SHIFT), "--like", f"set/{CASE}/fixed.nii.gz", "-o", "shift.mha")
     tetwarp("score", "set", "-r", "shift.mha", "--json", "scores.json")
     score = json.loads((folder / "scores.json").read_text())["scores"][0]
 
+    near(score["landmarks"]["mean_mm"], landmarks_by_elastix(folder), 1e-4, "landmarks", "elastix")
     along = ("--pull-field", "shift.mha", "--outside", "background")
     tetwarp("deform", "set/moving/labels.nii.gz", *along, "--interpolation", "vote", "-o", "warped.nii.gz")
     tetwarp("deform", "set/moving/dose.nii.gz", *along, "-o", "warped-dose.nii.gz")
@@ -79,9 +133,10 @@ def check(program: str, folder: pathlib.Path) -> None:
 
 
 def main() -> None:
-    if not shutil.which("plastimatch"):
-        print("skipped: there is no plastimatch")
-        sys.exit(77)
+    for needed in ("plastimatch", "elastix"):
+        if not shutil.which(needed):
+            print(f"skipped: there is no {needed}")
+            sys.exit(77)
     with tempfile.TemporaryDirectory() as folder:
         check(str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(folder))
 
