@@ -51,36 +51,45 @@ std::string text_of(const toml::node& node) {
   return text.str();
 }
 
-/// Refuses characters beyond ASCII outside of strings and comments, where TOML has none, and strings of several lines,
-/// which elastix does not write. toml++ 3.3 has no defined behaviour where it looks for blanks among such characters.
-void require_ascii_outside_strings(std::string_view text, const std::string& file) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  std::int64_t line = 1;
-  bool comment = false;
-  char quote = 0;  // that of the string in which a character stands
-  const auto where = [&] { return " in line " + std::to_string(line) + " of " + file; };
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    const char c = text[at];
-    if (c == '\n') {
-      ++line;
-      comment = false;
-      quote = 0;
-    } else if (quote != 0) {
-      if (c == '\\' && quote == '"') {
-        ++at;
-      } else if (c == quote) {
-        quote = 0;
-      }
-    } else if (!comment && (c == '"' || c == '\'')) {
-      require(text.substr(at, 3) != std::string(3, c), [&] { return "a string of several lines" + where(); });
-      quote = c;
-    } else if (!comment) {
-      comment = c == '#';
-      require(static_cast<unsigned char>(c) < 0x80,
-              [&] { return "a character that is not ASCII outside of a string" + where(); });
+constexpr std::string_view kHexDigits = "0123456789ABCDEF";
+
+/// A text in which `~` and two hexadecimal digits stand for each byte beyond ASCII, and for `~` itself. toml++ 3.3 has
+/// no defined behaviour where it looks for blanks among characters beyond ASCII, so it is given none; lines stay as
+/// they are.
+std::string ascii_of(std::string_view text) {
+  std::string ascii;
+  ascii.reserve(text.size());
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80 && c != '~') {
+      ascii += c;
+    } else {
+      ascii += {'~', kHexDigits[byte >> 4], kHexDigits[byte & 15]};
     }
   }
+  return ascii;
+}
+
+/// The text of which `ascii` was made.
+std::string text_of_ascii(std::string_view ascii) {
+  std::string text;
+  text.reserve(ascii.size());
+  for (std::size_t at = 0; at < ascii.size(); ++at) {
+    if (ascii[at] == '~' && at + 2 < ascii.size()) {
+      text += static_cast<char>(16 * kHexDigits.find(ascii[at + 1]) + kHexDigits.find(ascii[at + 2]));
+      at += 2;
+    } else {
+      text += ascii[at];
+    }
+  }
+  return text;
+}
+
+/// Whether a text has the escape of TOML for `~`, which would be taken for one of `ascii_of`.
+bool escapes_a_tilde(std::string_view text) {
+  for (const std::string_view escape : {"\\u007e", "\\u007E", "\\U0000007e", "\\U0000007E"})
+    if (text.find(escape) != std::string_view::npos) return true;
+  return false;
 }
 
 }  // namespace
@@ -118,11 +127,13 @@ void ParameterFile::read_text(const std::filesystem::path& path) {
 
 void ParameterFile::read_toml(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
-  const std::string all(std::istreambuf_iterator<char>(stream), {});
-  require_ascii_outside_strings(all, file_);
+  const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+  require(!escapes_a_tilde(bytes), "an escaped ~ in " + file_);
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  const std::string_view all(bytes);
   toml::table table;
   try {
-    table = toml::parse(all, file_);
+    table = toml::parse(ascii_of(all.substr(all.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0)), file_);
   } catch (const toml::parse_error& error) {
     throw InputError("line " + std::to_string(error.source().begin.line) + " of " + file_ +
                      " is no TOML: " + std::string(error.description()) + "; the file may be truncated");
@@ -138,11 +149,11 @@ void ParameterFile::read_toml(const std::filesystem::path& path) {
     } else if (const auto* boolean = node.as_boolean()) {
       value.text = boolean->get() ? "true" : "false";
     } else if (const auto* text = node.as_string()) {
-      value.text = '"' + text->get() + '"';
+      value.text = '"' + text_of_ascii(text->get()) + '"';
     } else {
       value.text = text_of(node);
     }
-    values_.emplace(std::string(key.str()), std::move(value));
+    values_.emplace(text_of_ascii(key.str()), std::move(value));
   }
 }
 

@@ -181,11 +181,29 @@ TEST(ElastixParameters, CharactersBeyondAsciiStandInStringsAndCommentsAlone) {
   };
   const std::string no_transform = read("");
   EXPECT_TRUE(says(no_transform, {"a.toml"}));
-  for (const char* taken : {"a = \"\xC3\xA9\"\n", "a = '\xC3\xA9'\n", "a = \"\\\"\xC3\xA9\"\n"})
+  for (const char* taken :
+       {"a = \"\xC3\xA9\"\n", "a = '\xC3\xA9'\n", "a = \"\\\"\xC3\xA9\"\n", "a = \"\"\"b\n\xC3\xA9\"\"\"\n"})
     EXPECT_EQ(read(taken), no_transform) << taken;
   for (const char* refused : {"\xC5\x96 = 3\n", "a = \xEF\xB3\xBF\n", "a = \"\" \xC3\xA9\n", "a = \"\\\\\" \xC3\xA9\n"})
-    EXPECT_TRUE(says(read(refused), {"line 2", "a.toml", "not ASCII"})) << refused;
-  EXPECT_TRUE(says(read("a = \"\"\"b\"c\"\"\" \xC3\xA9\n"), {"line 2", "several lines"}));
+    EXPECT_TRUE(says(read(refused), {"line 2", "a.toml", "no TOML"})) << refused;
+}
+
+TEST(ElastixParameters, NamesInTomlMayHaveAnyCharacter) {
+  const Scratch scratch;
+  const auto read = [&](const std::string& name) {
+    write_file(scratch / "a.toml",
+               "NumberOfParameters = 3\nTransform = \"TranslationTransform\"\nTransformParameters = [3, 5, 7]\n"
+               "FixedImageDimension = 3\nMovingImageDimension = 3\nHowToCombineTransforms = \"Compose\"\n"
+               "InitialTransformParameterFileName = \"" +
+                   name + "\"\n");
+    return refusal([&] { read_transform_file(scratch / "a.toml"); });
+  };
+  for (const std::string name : {"\xC3\xA9.toml", "~7E~.toml", "\xE2\x80\x83.toml"}) {
+    EXPECT_TRUE(says(read(name), {"InputError", name}));
+    std::filesystem::copy_file(scratch / "a.toml", scratch / name);
+    EXPECT_TRUE(says(read(name), {"circle"})) << "it begins with itself";
+  }
+  EXPECT_TRUE(says(read("\\u007eC3~A9.toml"), {"InputError", "an escaped ~"}));
 }
 
 /// Where transformix moves points, or nothing where it is not installed.
