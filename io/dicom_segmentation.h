@@ -12,16 +12,16 @@
 
 namespace tetwarp {
 
-/// Header of a Segmentation object (DICOM PS3.3 A.51): masks on one grid in one file.
+/// Header of a Segmentation or a Label Map Segmentation object (DICOM PS3.3 A.51): masks on one grid in one file.
 struct DicomSegmentation {
   /// One mask.
   struct Segment {
     int number = 0;     ///< Segment Number (0062,0004)
     std::string label;  ///< Segment Label (0062,0005)
   };
-  /// One slice of one mask.
+  /// One slice of one mask, or of a label map.
   struct Frame {
-    std::size_t segment = 0;  ///< index into `segments`
+    std::size_t segment = 0;  ///< index into `segments`; of a label map 0
     std::int64_t slice = 0;   ///< index k in `geometry`
   };
   /// Grid of all frames, with one empty slice before and one after them, and an empty row or column where the volume
@@ -29,10 +29,11 @@ struct DicomSegmentation {
   Geometry geometry;
   glm::i64vec3 first{0};    ///< first voxel of `geometry` that frames show, or would
   glm::i64vec3 last{0};     ///< the last one
-  bool fractional = false;  ///< whether Segmentation Type (0062,0001) is FRACTIONAL, not BINARY
-  /// Value of a voxel that belongs wholly to a segment: Maximum Fractional Value (0062,000E), or 1 for BINARY.
+  bool fractional = false;  ///< whether Segmentation Type (0062,0001) is FRACTIONAL
+  bool label_map = false;   ///< whether it is LABELMAP: pixels are Segment Numbers, or 0
+  /// Value of a voxel that belongs wholly to a segment: Maximum Fractional Value (0062,000E), or 1.
   int largest = 1;
-  std::vector<Segment> segments;       ///< in the order of the file
+  std::vector<Segment> segments;       ///< in the order of the file; of a label map without number 0, the background
   std::vector<Frame> frames;           ///< in the order of Pixel Data
   std::string frame_of_reference_uid;  ///< Frame of Reference UID (0020,0052)
 };
@@ -56,8 +57,8 @@ DicomSegmentation read_segmentation_header(const std::filesystem::path& path, do
 /// overlap.
 /// @param path    file to read
 /// @param header  from `read_segmentation_header` of this file
-/// @throws InputError as `read_segmentation_header`, and for Pixel Data that are compressed or of another size than the
-///         header states
+/// @throws InputError as `read_segmentation_header`, and for Pixel Data that are damaged or of another size than the
+///         header states, or show a segment that is not described
 std::vector<AnyVolume> read_segments(const std::filesystem::path& path, const DicomSegmentation& header);
 
 /// What was written of a segmentation.
@@ -66,9 +67,9 @@ struct SegmentationReport : AlongReport {
   bool empty = false;  ///< whether no voxel is left, so that one empty frame of the first segment was written
 };
 
-/// Writes segments that went through a field as a Segmentation object of the type and segments of the source.
-/// docs/reference/dicom.md lists what it takes over.
-/// Frames without a voxel are left out. On the grid of the series each frame names the slice on which it lies.
+/// Writes segments that went through a field as a Segmentation object of the type and segments of the source; those of
+/// a label map, which may overlap by then, as BINARY. docs/reference/dicom.md lists what it takes over. Frames without
+/// a voxel are left out. On the grid of the series each frame names the slice on which it lies.
 /// @param path      file to write
 /// @param segments  uint8, in the order of the source's segments, all on one straight and even grid
 /// @param header    header of the source

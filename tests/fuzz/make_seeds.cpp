@@ -271,10 +271,14 @@ void make_dose(const fs::path& folder) {
 }
 
 void make_segmentations(const fs::path& folder) {
+  const auto value = [](int n, int i, int j, int k) { return (i + j + k + n) % 3 / 2; };
   for (const bool fractional : {false, true}) {
-    MadeSeg seg{.fractional = fractional, .value = [](int n, int i, int j, int k) { return (i + j + k + n) % 3 / 2; }};
+    MadeSeg seg{.fractional = fractional, .value = value};
     seg.write(folder / (fractional ? "seg-fractional.dcm" : "seg-binary.dcm"));
   }
+  register_encoders();
+  MadeSeg{.label_bits = 16, .value = value}.write(folder / "seg-labels.dcm");
+  MadeSeg{.label_bits = 8, .value = value, .encoding = EXS_RLELossless}.write(folder / "seg-labels-rle.dcm");
 }
 
 void make_structure_set(const fs::path& folder) {

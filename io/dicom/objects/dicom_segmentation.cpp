@@ -15,7 +15,7 @@
 
 #include "io/dicom/derive/dicom_put.h"
 #include "io/dicom/objects/dicom_along_put.h"
-#include "io/dicom/pixels/dicom_plain_pixels.h"
+#include "io/dicom/pixels/dicom_frame_pixels.h"
 #include "io/dicom/scan/dicom_header.h"
 #include "io/dicom/scan/dicom_stream.h"
 #include "io/dicom_text.h"
@@ -40,8 +40,7 @@ class SegmentationFile {
     const OFCondition read = parse_dicom(format_, path, DCM_UndefinedTagKey).result;
     if (read.bad()) refuse(std::string("cannot be read as DICOM: ") + read.text());
     const std::string sop_class = text_of(data(), DCM_SOPClassUID);
-    if (sop_class == kLabelMap) refuse("is a LABELMAP, of which no segment is read; write it as BINARY");
-    if (sop_class != UID_SegmentationStorage) refuse("is no DICOM segmentation");
+    if (sop_class != UID_SegmentationStorage && sop_class != kLabelMap) refuse("is no DICOM segmentation");
   }
 
   DicomSegmentation header(double otherwise_mm, const Geometry* volume);
@@ -58,11 +57,11 @@ class SegmentationFile {
   void read_bits(DicomSegmentation& seg);
   void read_segment_list(DicomSegmentation& seg);
   void read_plane(DicomSegmentation& seg);
+  std::size_t segment_of(const DicomSegmentation& seg, std::size_t frame);
   void place_frames(DicomSegmentation& seg, double otherwise_mm);
   static void pad_cropped(DicomSegmentation& seg, const Geometry& volume);
   void require_dense(const DicomSegmentation& seg);
   double slice_distance(const std::vector<double>& places, double otherwise_mm);
-  std::span<const Uint8> pixels(std::size_t expected);
 
   std::filesystem::path path_;
   DcmFileFormat format_;
@@ -101,13 +100,15 @@ DcmItem* SegmentationFile::group(DcmItem& frame, const DcmTagKey& sequence) {
   return nullptr;
 }
 
-/// PS3.3 C.8.20.2: one bit a pixel, or eight.
+/// PS3.3 C.8.20.2: one bit a pixel, or eight, or in label maps sixteen.
 void SegmentationFile::read_bits(DicomSegmentation& seg) {
   const std::string type = text_of(data(), DCM_SegmentationType);
-  if (type != "BINARY" && type != "FRACTIONAL")
-    refuse("has Segmentation Type (0062,0001) " + known_code(type, {"LABELMAP"}) + ", expected BINARY or FRACTIONAL");
+  seg.label_map = text_of(data(), DCM_SOPClassUID) == kLabelMap;
+  if (seg.label_map ? type != "LABELMAP" : type != "BINARY" && type != "FRACTIONAL")
+    refuse("has Segmentation Type (0062,0001) " + known_code(type, {"BINARY", "FRACTIONAL", "LABELMAP"}) +
+           ", expected " + (seg.label_map ? "LABELMAP" : "BINARY or FRACTIONAL"));
   seg.fractional = type == "FRACTIONAL";
-  const int bits = seg.fractional ? 8 : 1;
+  const int bits = seg.label_map && word(DCM_BitsAllocated) == 16 ? 16 : seg.fractional || seg.label_map ? 8 : 1;
   for (const auto& [tag, expected] : std::initializer_list<std::pair<DcmTagKey, int>>{{DCM_BitsAllocated, bits},
                                                                                       {DCM_BitsStored, bits},
                                                                                       {DCM_HighBit, bits - 1},
@@ -125,13 +126,15 @@ void SegmentationFile::read_bits(DicomSegmentation& seg) {
 void SegmentationFile::read_segment_list(DicomSegmentation& seg) {
   for (DcmItem* item : items(DCM_SegmentSequence, kMostSegments)) {
     Uint16 number = 0;
-    if (item->findAndGetUint16(DCM_SegmentNumber, number).bad() || number == 0)
-      refuse("has a segment without " + tag_name(DCM_SegmentNumber));
+    const bool is_stated = item->findAndGetUint16(DCM_SegmentNumber, number).good();
+    if (is_stated && number == 0 && seg.label_map) continue;  // the background
+    if (!is_stated || number == 0) refuse("has a segment without " + tag_name(DCM_SegmentNumber));
     for (const auto& other : seg.segments) {
       if (other.number == number) refuse("has two segments of number " + std::to_string(number));
     }
     seg.segments.push_back({number, text_of(*item, DCM_SegmentLabel)});
   }
+  if (seg.segments.empty()) refuse("has no segment but the background");
 }
 
 /// Rows and columns, the same in all frames.
@@ -181,6 +184,19 @@ double SegmentationFile::slice_distance(const std::vector<double>& places, doubl
   return closest;
 }
 
+/// Index of the segment that a frame shows.
+std::size_t SegmentationFile::segment_of(const DicomSegmentation& seg, std::size_t frame) {
+  DcmItem* identification = group(*frames_[frame], DCM_SegmentIdentificationSequence);
+  Uint16 number = 0;
+  if (!identification || identification->findAndGetUint16(DCM_ReferencedSegmentNumber, number).bad())
+    refuse("does not say the segment of frame " + std::to_string(frame + 1));
+  const auto segment = std::ranges::find(seg.segments, int{number}, &DicomSegmentation::Segment::number);
+  if (segment == seg.segments.end())
+    refuse("shows segment " + std::to_string(number) + " in frame " + std::to_string(frame + 1) +
+           ", which its Segment Sequence (0062,0002) does not describe");
+  return static_cast<std::size_t>(segment - seg.segments.begin());
+}
+
 void SegmentationFile::place_frames(DicomSegmentation& seg, double otherwise_mm) {
   constexpr double kSamePlace = 1e-3, kOffLine = 0.01;  // mm
   const glm::dvec3 normal = seg.geometry.direction[2];
@@ -213,19 +229,11 @@ void SegmentationFile::place_frames(DicomSegmentation& seg, double otherwise_mm)
     if (!(glm::length(off) <= kOffLine + 1e-4 * along))
       refuse("has frames that do not lie above one another: frame " + std::to_string(n + 1) + " is " +
              number(glm::length(off)) + " mm off the line of the others");
-    DcmItem* identification = group(*frames_[n], DCM_SegmentIdentificationSequence);
-    Uint16 shown_segment = 0;
-    if (!identification || identification->findAndGetUint16(DCM_ReferencedSegmentNumber, shown_segment).bad())
-      refuse("does not say the segment of frame " + std::to_string(n + 1));
-    const auto segment = std::ranges::find(seg.segments, int{shown_segment}, &DicomSegmentation::Segment::number);
-    if (segment == seg.segments.end())
-      refuse("shows segment " + std::to_string(shown_segment) + " in frame " + std::to_string(n + 1) +
-             ", which its Segment Sequence (0062,0002) does not describe");
-    seg.frames.push_back({static_cast<std::size_t>(segment - seg.segments.begin()),
-                          static_cast<std::int64_t>(std::round(along / step)) + 1});
+    const std::size_t segment = seg.label_map ? 0 : segment_of(seg, n);
+    seg.frames.push_back({segment, static_cast<std::int64_t>(std::round(along / step)) + 1});
     if (!seen.emplace(seg.frames.back().segment, seg.frames.back().slice).second)
-      refuse("shows segment " + std::to_string(shown_segment) + " twice at one place, the second time in frame " +
-             std::to_string(n + 1));
+      refuse("shows " + (seg.label_map ? "labels" : "segment " + std::to_string(seg.segments[segment].number)) +
+             " twice at one place, the second time in frame " + std::to_string(n + 1));
   }
 }
 
@@ -255,7 +263,7 @@ void SegmentationFile::pad_cropped(DicomSegmentation& seg, const Geometry& volum
 /// A few frames far apart, and segments without any, can stand for far more memory than the file takes.
 void SegmentationFile::require_dense(const DicomSegmentation& seg) {
   constexpr double kMost = 10'000;
-  const double stored = static_cast<double>(seg.frames.size()) / (seg.fractional ? 1 : 8),
+  const double stored = static_cast<double>(seg.frames.size()) / (seg.fractional || seg.label_map ? 1 : 8),
                held = static_cast<double>(seg.segments.size()) * static_cast<double>(seg.geometry.size.z);
   if (held > kMost * stored)
     refuse("has " + plural(seg.frames.size(), "frame") + " for " + plural(seg.segments.size(), "segment") + " of " +
@@ -282,38 +290,41 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm, const Geometry* 
   return seg;
 }
 
-/// Pixel Data as they lie in the file, bytes whatever their value representation.
-std::span<const Uint8> SegmentationFile::pixels(std::size_t expected) {
-  DcmElement& element = plain_pixels(data(), path_, expected, "a segmentation");
-  Uint8* bytes = nullptr;
-  if (element.getUint8Array(bytes).good() && bytes) return {bytes, expected};
-  Uint16* words = nullptr;
-  if (element.getUint16Array(words).good() && words) return {reinterpret_cast<const Uint8*>(words), expected};
-  refuse("has no Pixel Data (7FE0,0010) that can be read");
-}
-
 std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& header) {
   const glm::i64vec3 size = header.geometry.size, shown = header.last - header.first + std::int64_t{1};
-  const auto plane = static_cast<std::size_t>(shown.x * shown.y), count = plane * header.frames.size();
-  const std::span<const Uint8> stored = pixels(header.fractional ? count : (count + 7) / 8);
+  const FramePixels pixels(format_, path_, header.frames.size(), "a segmentation");
+  std::vector<std::uint16_t> values =
+      pixels.frame(0);  // before anything is allocated that a damaged file may make large
   std::vector<AnyVolume> volumes;
   for (std::size_t n = 0; n < header.segments.size(); ++n) {
     volumes.emplace_back(header.geometry, VoxelType::u8);
     std::ranges::fill(volumes.back().as<std::uint8_t>(), std::uint8_t{0});
   }
+  std::vector<std::span<std::uint8_t>> voxels;
+  for (AnyVolume& volume : volumes) voxels.push_back(volume.as<std::uint8_t>());
+  std::vector<std::size_t> segment_of_label(header.label_map ? kMostSegments + 1 : 0, volumes.size());
+  for (std::size_t n = 0; n < header.segments.size() && header.label_map; ++n)
+    segment_of_label[static_cast<std::size_t>(header.segments[n].number)] = n;
   for (std::size_t n = 0; n < header.frames.size(); ++n) {
-    const auto& [segment, slice] = header.frames[n];
-    const std::int64_t corner = header.first.x + size.x * (header.first.y + size.y * slice);
-    const auto to = volumes[segment].as<std::uint8_t>().subspan(static_cast<std::size_t>(corner));
-    for (std::size_t pixel = 0; pixel < plane; ++pixel) {
-      const std::size_t at = n * plane + pixel;  // bits follow one another through all frames, the lowest first
-      const std::size_t row = pixel / static_cast<std::size_t>(shown.x),
-                        column = pixel % static_cast<std::size_t>(shown.x);
-      std::uint8_t& value = to[row * static_cast<std::size_t>(size.x) + column];
-      value = header.fractional ? stored[at] : static_cast<std::uint8_t>(stored[at / 8] >> (at % 8) & 1);
-      if (value > header.largest)
-        refuse("has the value " + std::to_string(value) + " in frame " + std::to_string(n + 1) + ", above " +
-               tag_name(DCM_MaximumFractionalValue) + " " + std::to_string(header.largest));
+    if (n > 0) values = pixels.frame(n);
+    const std::string where = " in frame " + std::to_string(n + 1);
+    const std::int64_t corner = header.first.x + size.x * (header.first.y + size.y * header.frames[n].slice);
+    for (std::size_t pixel = 0; pixel < values.size(); ++pixel) {
+      int value = values[pixel];
+      if (value == 0) continue;
+      std::size_t segment = header.frames[n].segment;
+      if (header.label_map) {
+        segment = segment_of_label[values[pixel]];
+        if (segment == volumes.size())
+          refuse("shows segment " + std::to_string(value) + where +
+                 ", which its Segment Sequence (0062,0002) does not describe");
+        value = 1;
+      } else if (value > header.largest) {
+        refuse("has the value " + std::to_string(value) + where + ", above " + tag_name(DCM_MaximumFractionalValue) +
+               " " + std::to_string(header.largest));
+      }
+      const auto at = static_cast<std::int64_t>(pixel), row = at / shown.x, column = at % shown.x;
+      voxels[segment][static_cast<std::size_t>(corner + row * size.x + column)] = static_cast<std::uint8_t>(value);
     }
   }
   return volumes;

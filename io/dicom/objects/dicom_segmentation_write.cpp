@@ -144,13 +144,28 @@ void put_series_reference(DcmItem& target, const Geometry& grid, const WrittenSe
     append_slice_reference(reference, DCM_ReferencedInstanceSequence, series, k);
 }
 
-/// Segmentation Image (PS3.3 C.8.20.2) and Content Identification (10.9): as in the source.
-void put_segmentation(DcmItem& target, DcmDataset& source) {
+/// Leaves the background of a label map out of Segment Sequence (0062,0002), where a segmentation has none.
+void drop_background(DcmItem& target) {
+  DcmSequenceOfItems* segments = nullptr;
+  if (target.findAndGetSequence(DCM_SegmentSequence, segments).bad()) return;
+  for (unsigned long n = segments->card(); n-- > 0;) {
+    Uint16 number = 0;
+    DcmItem* segment = segments->getItem(n);
+    if (segment->findAndGetUint16(DCM_SegmentNumber, number).good() && number == 0) delete segments->remove(segment);
+  }
+}
+
+/// Segmentation Image (PS3.3 C.8.20.2) and Content Identification (10.9): as in the source; a label map becomes BINARY.
+void put_segmentation(DcmItem& target, DcmDataset& source, const DicomSegmentation& header) {
   for (const DcmTagKey& tag :
        {DCM_SegmentationType, DCM_SegmentSequence, DCM_SegmentationFractionalType, DCM_MaximumFractionalValue,
         DCM_ContentLabel, DCM_ContentDescription, DCM_AlternateContentDescriptionSequence, DCM_ContentCreatorName,
         DCM_ContentCreatorIdentificationCodeSequence})
     carry_attribute(target, source, tag);
+  if (header.label_map) {
+    put(target, DCM_SegmentationType, "BINARY");
+    drop_background(target);
+  }
   if (text_of(target, DCM_LossyImageCompression).empty()) put(target, DCM_LossyImageCompression, "00");
 }
 
@@ -184,7 +199,7 @@ SegmentationReport write_derived_segmentation(const std::filesystem::path& path,
   const std::vector<std::byte> pixels = packed(segments, frames, header);
 
   DcmDataset target;
-  put_segmentation(target, source);
+  put_segmentation(target, source, header);
   put_along(target, source, along, series, type_2_of_segmentation());
   put(target, DCM_SOPClassUID, UID_SegmentationStorage);
   put(target, DCM_Modality, "SEG");

@@ -19,26 +19,6 @@
 namespace tetwarp {
 namespace {
 
-/// The fragments of compressed Pixel Data, without the offset table.
-std::vector<std::span<const std::byte>> fragments_of(DcmPixelData& pixels, const DicomFileHeader& header) {
-  E_TransferSyntax encoding = EXS_Unknown;
-  const DcmRepresentationParameter* parameter = nullptr;
-  DcmPixelSequence* sequence = nullptr;
-  pixels.getOriginalRepresentationKey(encoding, parameter);
-  if (pixels.getEncapsulatedRepresentation(encoding, parameter, sequence).bad() || !sequence) {
-    refuse_pixels(header, "expected compressed fragments, found none");
-  }
-  std::vector<std::span<const std::byte>> fragments;
-  DcmObject* object = sequence->nextInContainer(nullptr);
-  while (object && (object = sequence->nextInContainer(object))) {
-    auto& item = dynamic_cast<DcmPixelItem&>(*object);
-    Uint8* data = nullptr;
-    if (item.getUint8Array(data).bad()) refuse_pixels(header, "expected a fragment, found none that can be read");
-    if (data) fragments.push_back(std::as_bytes(std::span(data, item.getLength())));
-  }
-  return fragments;
-}
-
 std::vector<std::uint16_t> decode_bytes(std::span<const std::uint8_t> frame, const DicomFileHeader& header) {
   switch (pixel_coding(header.transfer_syntax_uid).value_or(PixelCoding::native)) {
     case PixelCoding::rle: return decode_rle(frame, header);
@@ -113,6 +93,25 @@ HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, cons
 }
 
 }  // namespace
+
+std::vector<std::span<const std::byte>> fragments_of(DcmPixelData& pixels, const DicomFileHeader& header) {
+  E_TransferSyntax encoding = EXS_Unknown;
+  const DcmRepresentationParameter* parameter = nullptr;
+  DcmPixelSequence* sequence = nullptr;
+  pixels.getOriginalRepresentationKey(encoding, parameter);
+  if (pixels.getEncapsulatedRepresentation(encoding, parameter, sequence).bad() || !sequence) {
+    refuse_pixels(header, "expected compressed fragments, found none");
+  }
+  std::vector<std::span<const std::byte>> fragments;
+  DcmObject* object = sequence->nextInContainer(nullptr);
+  while (object && (object = sequence->nextInContainer(object))) {
+    auto& item = dynamic_cast<DcmPixelItem&>(*object);
+    Uint8* data = nullptr;
+    if (item.getUint8Array(data).bad()) refuse_pixels(header, "expected a fragment, found none that can be read");
+    if (data) fragments.push_back(std::as_bytes(std::span(data, item.getLength())));
+  }
+  return fragments;
+}
 
 std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byte>> fragments,
                                         const DicomFileHeader& header) {

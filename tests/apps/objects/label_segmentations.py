@@ -69,19 +69,22 @@ def dcmqi_tool(name):
     return str(beside) if beside.exists() else tool(name)
 
 
-def made_by_dcmqi(world, *options):
-    """Two label images, as 3D Slicer has them: three segments that do not overlap, and one that does."""
+def made_by_dcmqi(world, *options, overlap=True):
+    """Label images, as 3D Slicer has them: three segments that do not overlap, and in a second image one that does."""
     folder, ring = world.folder, masks_of(world)[1]
-    volumes = np.array([*labels_in_file(world), ring > 0])
-    save_nifti(world, ring, folder / "b.nii")
-    (folder / "meta.json").write_text(
-        json.dumps(metainformation([[(1, "ball"), (2, "plate"), (3, "box")], [(1, "ring")]]))
-    )
+    volumes, images = labels_in_file(world), [f"{folder}/a.nii"]
+    segments = [[(1, "ball"), (2, "plate"), (3, "box")]]
+    if overlap:
+        volumes.append(ring > 0)
+        images.append(f"{folder}/b.nii")
+        segments.append([(1, "ring")])
+        save_nifti(world, ring, folder / "b.nii")
+    (folder / "meta.json").write_text(json.dumps(metainformation(segments)))
     path = folder / "dcmqi.dcm"
     run(
         dcmqi_tool("itkimage2segimage"),
         "--inputImageList",
-        f"{folder}/a.nii,{folder}/b.nii",
+        ",".join(images),
         "--inputDICOMDirectory",
         world.ct,
         "--outputDICOM",
@@ -90,11 +93,11 @@ def made_by_dcmqi(world, *options):
         folder / "meta.json",
         *options,
     )
-    return path, volumes
+    return path, np.array(volumes)
 
 
-def check_dcmqi(world, *options):
-    path, volumes = made_by_dcmqi(world, *options)
+def check_dcmqi(world, *options, **named):
+    path, volumes = made_by_dcmqi(world, *options, **named)
     out, _ = world.moved_object(path)
     back = world.folder / "back"
     back.mkdir(exist_ok=True)
@@ -146,6 +149,10 @@ def dcmqi_cases():
     yield "SEG BINARY, segments of two images", proof, check_dcmqi
     yield "SEG BINARY, empty frames kept", proof, lambda world: check_dcmqi(world, "--skip", "0")
     yield "SEG BINARY, deflated", proof, lambda world: check_dcmqi(world, "--compress", "deflate")
+    for name, more in (("", ()), (", labels as Segment Numbers", ("--useLabelIDAsSegmentNumber",))):
+        yield f"SEG LABELMAP{name}", proof, lambda world, more=more: check_dcmqi(
+            world, "--segmentationType", "labelmap", *more, overlap=False
+        )
 
 
 def dcmqi_version():

@@ -105,7 +105,8 @@ class Highdicom:
     def check(self, world, path, volumes, how, on_slices=True, field=FIELD, expected=None, **named):
         out, slices = world.moved_object(path, ":own" if named.get("own") else "", field=field)
         found, source = self.hd.seg.segread(out), self.hd.seg.segread(path)
-        expect(found.SegmentSequence == source.SegmentSequence, "Segment Sequence")
+        described = [segment for segment in source.SegmentSequence if segment.SegmentNumber != 0]  # no background
+        expect(list(found.SegmentSequence) == described, "Segment Sequence")
         for keyword in (
             "SpecificCharacterSet",
             "SegmentationType",
@@ -114,7 +115,8 @@ class Highdicom:
             "ContentLabel",
             "ContentCreatorName",
         ):
-            expect(found.get(keyword) == source.get(keyword), keyword)
+            wanted = "BINARY" if source.get(keyword) == "LABELMAP" else source.get(keyword)
+            expect(found.get(keyword) == wanted, keyword)
         expect(found.get_tracking_ids() == source.get_tracking_ids(), "tracking IDs")
         derived = [s.SOPInstanceUID for s in slices]
         named_series = {(study, series) for study, series, _ in found.get_source_image_uids()}
@@ -138,7 +140,10 @@ class Highdicom:
 
     def on_slices(self, world, volumes, kind="BINARY", edit=lambda made: made, field=FIELD, expected=None, **named):
         array = np.moveaxis(volumes, 0, -1)
-        array = array / np.float64(255) if kind == "FRACTIONAL" else array
+        if kind == "FRACTIONAL":
+            array = array / np.float64(255)
+        elif kind == "LABELMAP":
+            array = (array * np.arange(1, len(volumes) + 1)).max(-1).astype(named.pop("type", np.uint8))
         path = self.save(world, edit(self.make(world, array, kind, len(volumes), **named)))
         return self.check(
             world, path, volumes, "linear" if kind == "FRACTIONAL" else "vote", field=field, expected=expected
@@ -230,9 +235,18 @@ def highdicom_cases():
     def case(run_it):
         return lambda world: run_it(Highdicom(), world)
 
-    def labels(world):
+    def apart(world):
+        """Three masks without overlaps."""
         masks = masks_of(world)
-        return (masks[0] + 2 * (masks[3] & ~masks[0])).astype(np.uint8)
+        return np.array([masks[0], masks[3] & ~masks[0], masks[2] & ~masks[0] & ~masks[3]]).astype(np.uint8)
+
+    def many(world, count):
+        """Boxes of 4 x 4 x 2 voxels, none of which touches another."""
+        volumes = np.zeros((count, *world.shape), np.uint8)
+        for n, volume in enumerate(volumes):
+            i, j, k = 3 + n % 10 * 6, 3 + n // 10 % 6 * 6, 2 + n // 60 * 4
+            volume[k : k + 2, j : j + 4, i : i + 4] = 1
+        return volumes
 
     syntax = pydicom.uid
     proof = "read by highdicom: voxels, segments, references"
@@ -272,24 +286,19 @@ def highdicom_cases():
                 lambda h, w, grid=grid: h.on_grid(w, *grid(w), own=True, omit=False)
             )
             yield f"SEG BINARY, {name}, `own`", proof, case(lambda h, w, grid=grid: h.on_grid(w, *grid(w), own=True))
-    yield "SEG FRACTIONAL, RLE", "the message", case(
-        lambda h, w: refused(
-            w,
-            h.save(
-                w,
-                h.make(
-                    w,
-                    np.moveaxis(fractions_of(w), 0, -1) / 255.0,
-                    "FRACTIONAL",
-                    2,
-                    transfer_syntax_uid=syntax.RLELossless,
-                ),
-            ),
-            ("FILE", "compressed", "RLE"),
+    for name, coding in (("RLE", syntax.RLELossless), ("JPEG-LS", syntax.JPEGLSLossless), ("JPEG 2000", syntax.JPEG2000Lossless)):
+        yield f"SEG FRACTIONAL, {name}", proof, case(
+            lambda h, w, coding=coding: h.on_slices(w, fractions_of(w), "FRACTIONAL", transfer_syntax_uid=coding)
         )
+        yield f"SEG LABELMAP, {name}", proof, case(
+            lambda h, w, coding=coding: h.on_slices(w, apart(w), "LABELMAP", transfer_syntax_uid=coding)
+        )
+    yield "SEG LABELMAP, 3 segments", proof, case(lambda h, w: h.on_slices(w, apart(w), "LABELMAP"))
+    yield "SEG LABELMAP, empty frames kept", proof, case(
+        lambda h, w: h.on_slices(w, apart(w), "LABELMAP", omit_empty_frames=False)
     )
-    yield "SEG LABELMAP", "the message", case(
-        lambda h, w: refused(w, h.save(w, h.make(w, labels(w), "LABELMAP", 2)), ("FILE", "LABELMAP"))
+    yield "SEG LABELMAP, 300 segments", proof, case(
+        lambda h, w: h.on_slices(w, many(w, 300), "LABELMAP", type=np.uint16)
     )
 
 

@@ -3,11 +3,8 @@
 
 #pragma once
 
-#include <dcmtk/dcmdata/dcrleerg.h>
-#include <dcmtk/dcmjpeg/djencode.h>
-#include <dcmtk/dcmjpls/djencode.h>
-
 #include "tests/support/dicom/encapsulated.h"
+#include "tests/support/dicom/encoders.h"
 #ifdef TETWARP_WITH_OPENJPEG
 #include "tests/support/dicom/jpeg2000_maker.h"
 #endif
@@ -30,15 +27,6 @@ inline MadeSlice busy_slice() {
   slice.intercept = "0";
   slice.words = busy_words(120);
   return slice;
-}
-
-inline void register_encoders() {
-  DcmRLEEncoderRegistration::registerCodecs();
-  DJEncoderRegistration::registerCodecs();
-  DJLSEncoderRegistration::registerCodecs(0, 0, 0, 0,
-                                          // Takes the words as they are: with the other way DCMTK reads beyond the end
-                                          // of images of odd size.
-                                          OFFalse);
 }
 
 /// `busy_slice` in high-throughput JPEG 2000, which no library of Debian 12 but OpenJPH's own encodes: made by

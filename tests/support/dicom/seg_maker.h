@@ -21,11 +21,13 @@ struct MadeSeg {
   int columns = 6, rows = 4, slices = 3;
   glm::dvec3 origin{-10, -20, 30}, spacing{0.5, 0.75, 2.5};
   bool fractional = false;
+  int label_bits = 0;                                 ///< 8 or 16: a label map, in which the last segment wins
   int largest = 255;                                  ///< Maximum Fractional Value
   std::vector<int> segments = {1, 2};                 ///< Segment Numbers
   std::function<int(int, int, int, int)> value = {};  ///< value of segment n at voxel (i, j, k)
   std::string spacing_between = "2.5", frame = "1.2.4", study = "1.2", patient = "SECRET-ID";
-  std::function<void(DcmDataset&)> edit = {};  ///< changes the data set at last, before it is written
+  E_TransferSyntax encoding = EXS_LittleEndianExplicit;  ///< of a compressed one the encoder must be registered
+  std::function<void(DcmDataset&)> edit = {};            ///< changes the data set at last, before it is written
 
   void write(const std::filesystem::path& path) const {
     DcmFileFormat format;
@@ -35,7 +37,8 @@ struct MadeSeg {
     put_shared(data);
     put_frames(data);
     if (edit) edit(data);
-    const OFCondition result = format.saveFile(path.c_str(), EXS_LittleEndianExplicit);
+    if (data.chooseRepresentation(encoding, nullptr).bad()) throw std::runtime_error("no such coding");
+    const OFCondition result = format.saveFile(path.c_str(), encoding);
     if (result.bad()) throw std::runtime_error(result.text());
   }
 
@@ -58,11 +61,12 @@ struct MadeSeg {
     text(to, DCM_CodeMeaning, meaning);
   }
   static constexpr char kDimensions[] = "1.2.6.1";
+  static constexpr char kLabelMapStorage[] = "1.2.840.10008.5.1.4.1.1.66.7";
 
  private:
   void put_header(DcmDataset& data) const {
     for (const auto& [tag, given] : std::initializer_list<std::pair<DcmTagKey, std::string>>{
-             {DCM_SOPClassUID, UID_SegmentationStorage},
+             {DCM_SOPClassUID, label_bits > 0 ? kLabelMapStorage : UID_SegmentationStorage},
              {DCM_SOPInstanceUID, "1.2.6.2"},
              {DCM_SeriesInstanceUID, "1.2.6"},
              {DCM_StudyInstanceUID, study},
@@ -94,10 +98,12 @@ struct MadeSeg {
              {DCM_LossyImageCompression, "00"},
              {DCM_PhotometricInterpretation, "MONOCHROME2"},
              {DcmTagKey(0x0029, 0x0010), "PRIVATE MAKER"},
-             {DCM_SegmentationType, fractional ? "FRACTIONAL" : "BINARY"}}) {
+             {DCM_SegmentationType, label_bits > 0 ? "LABELMAP"
+                                    : fractional   ? "FRACTIONAL"
+                                                   : "BINARY"}}) {
       text(data, tag, given);
     }
-    const int bits = fractional ? 8 : 1;
+    const int bits = label_bits > 0 ? label_bits : fractional ? 8 : 1;
     for (const auto& [tag, given] : std::initializer_list<std::pair<DcmTagKey, int>>{{DCM_Rows, rows},
                                                                                      {DCM_Columns, columns},
                                                                                      {DCM_SamplesPerPixel, 1},
@@ -112,7 +118,9 @@ struct MadeSeg {
   }
 
   void put_segments(DcmDataset& data) const {
-    for (const int number : segments) {
+    std::vector<int> numbers = segments;
+    if (label_bits > 0) numbers.insert(numbers.begin(), 0);  // the background
+    for (const int number : numbers) {
       DcmItem& item = append(data, DCM_SegmentSequence);
       word(item, DCM_SegmentNumber, number);
       text(item, DCM_SegmentLabel, "Organ " + std::to_string(number));
@@ -145,6 +153,7 @@ struct MadeSeg {
   }
 
   void put_frames(DcmDataset& data) const {
+    if (label_bits > 0) return put_labels(data);
     std::vector<Uint8> pixels;
     std::size_t bit = 0;
     int frames = 0;
@@ -157,17 +166,45 @@ struct MadeSeg {
           if (fractional || bit % 8 == 0) pixels.push_back(0);
           pixels.back() = static_cast<Uint8>(fractional ? here : pixels.back() | here << bit % 8);
         }
-        DcmItem& groups = append(data, DCM_PerFrameFunctionalGroupsSequence);
-        const Uint32 index[2] = {static_cast<Uint32>(k + 1), static_cast<Uint32>(n + 1)};
-        append(groups, DCM_FrameContentSequence).putAndInsertUint32Array(DCM_DimensionIndexValues, index, 2);
-        text(append(groups, DCM_PlanePositionSequence), DCM_ImagePositionPatient,
-             position_text(origin.x, origin.y, origin.z + k * spacing.z));
-        word(append(groups, DCM_SegmentIdentificationSequence), DCM_ReferencedSegmentNumber, segments[n]);
+        word(append(put_frame(data, k, {k + 1, static_cast<int>(n) + 1}), DCM_SegmentIdentificationSequence),
+             DCM_ReferencedSegmentNumber, segments[n]);
       }
     }
     text(data, DCM_NumberOfFrames, std::to_string(frames));
     if (pixels.size() % 2 != 0) pixels.push_back(0);
     data.putAndInsertUint8Array(DCM_PixelData, pixels.data(), pixels.size());
+  }
+
+  /// A frame for each slice, whose pixels are Segment Numbers.
+  void put_labels(DcmDataset& data) const {
+    std::vector<Uint16> labels;
+    for (int k = 0; k < slices; ++k) {
+      put_frame(data, k, {k + 1});
+      for (int pixel = 0; pixel < rows * columns; ++pixel) {
+        labels.push_back(0);
+        for (std::size_t n = 0; n < segments.size(); ++n) {
+          if (value(static_cast<int>(n), pixel % columns, pixel / columns, k) != 0)
+            labels.back() = static_cast<Uint16>(segments[n]);
+        }
+      }
+    }
+    text(data, DCM_NumberOfFrames, std::to_string(slices));
+    if (label_bits == 16) {
+      data.putAndInsertUint16Array(DCM_PixelData, labels.data(), labels.size());
+    } else {
+      const std::vector<Uint8> bytes(labels.begin(), labels.end());
+      data.putAndInsertUint8Array(DCM_PixelData, bytes.data(), bytes.size());
+    }
+  }
+
+  DcmItem& put_frame(DcmDataset& data, int k, const std::vector<int>& dimensions) const {
+    DcmItem& groups = append(data, DCM_PerFrameFunctionalGroupsSequence);
+    const std::vector<Uint32> index(dimensions.begin(), dimensions.end());
+    append(groups, DCM_FrameContentSequence)
+        .putAndInsertUint32Array(DCM_DimensionIndexValues, index.data(), index.size());
+    text(append(groups, DCM_PlanePositionSequence), DCM_ImagePositionPatient,
+         position_text(origin.x, origin.y, origin.z + k * spacing.z));
+    return groups;
   }
 
   bool is_empty(int segment, int k) const {

@@ -5,7 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/support/dicom/encapsulated.h"
+#include "tests/support/dicom/encoders.h"
 #include "tests/support/dicom/seg_maker.h"
 #include "tests/support/says.h"
 #include "tests/support/scratch.h"
@@ -119,7 +122,8 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
       MadeSeg::text(MadeSeg::append(frame_of(data, n), DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient,
                     "1\\0\\0\\0\\0.9\\0");
   });
-  refused("Segmentation Type", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "LABELMAP"); });
+  refused("LABELMAP, expected BINARY or FRACTIONAL",
+          [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "LABELMAP"); });
   refused("(0062,0001) no known value,", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "SECRET"); });
   refused(
       "above (0062,000e)",
@@ -160,7 +164,118 @@ TEST(Segmentation, WhatIsNotOnOneEvenGridOrCutShortOrContradictsItselfIsRefused)
   refused("no DICOM segmentation", [](DcmDataset& data) { MadeSeg::text(data, DCM_SOPClassUID, UID_CTImageStorage); });
 }
 
-TEST(Segmentation, CompressedPixelsAreRefusedByTheirName) {
+TEST(Segmentation, OfALabelMapEachLabelIsASegment) {
+  const Scratch scratch;
+  for (const int bits : {8, 16}) {
+    const std::vector<int> numbers = bits == 8 ? std::vector{7, 3} : std::vector{700, 65535};
+    MadeSeg made{.label_bits = bits, .segments = numbers, .value = two_organs};
+    made.write(scratch / "seg");
+    ASSERT_TRUE(is_dicom_segmentation(scratch / "seg"));
+    const DicomSegmentation seg = read_segmentation_header(scratch / "seg");
+    EXPECT_TRUE(seg.label_map);
+    EXPECT_FALSE(seg.fractional);
+    ASSERT_EQ(seg.segments.size(), 2U) << "the background is none";
+    EXPECT_EQ(seg.segments[1].number, numbers[1]);
+    EXPECT_EQ(seg.frames.size(), 3U);
+    const std::vector<AnyVolume> volumes = read_segments(scratch / "seg", seg);
+    ASSERT_EQ(volumes.size(), 2U);
+    for (int at = 0; at < 6 * 4 * 5; ++at) {
+      const int i = at % 6, j = at / 6 % 4, k = at / 24 - 1;
+      const bool is_inside = k >= 0 && k <= 2, second = is_inside && two_organs(1, i, j, k) != 0,
+                 first = is_inside && two_organs(0, i, j, k) != 0 && !second;
+      ASSERT_EQ(volumes[0].as<std::uint8_t>()[static_cast<std::size_t>(at)], first ? 1 : 0) << bits << " " << at;
+      ASSERT_EQ(volumes[1].as<std::uint8_t>()[static_cast<std::size_t>(at)], second ? 1 : 0) << bits << " " << at;
+    }
+  }
+}
+
+TEST(Segmentation, LabelMapsThatContradictThemselvesAreRefused) {
+  const Scratch scratch;
+  const auto refused = [&](const char* names, const std::function<void(DcmDataset&)>& edit) {
+    MadeSeg{.label_bits = 8, .value = two_organs, .edit = edit}.write(scratch / "seg");
+    try {
+      read_segments(scratch / "seg", read_segmentation_header(scratch / "seg"));
+      FAIL() << names;
+    } catch (const InputError& error) {
+      EXPECT_TRUE(says(error.what(), {names, (scratch / "seg").string()}));
+    }
+  };
+  refused("BINARY, expected LABELMAP", [](DcmDataset& data) { MadeSeg::text(data, DCM_SegmentationType, "BINARY"); });
+  refused("BitsStored 4, expected 8", [](DcmDataset& data) { MadeSeg::word(data, DCM_BitsStored, 4); });
+  refused("labels twice at one place", [](DcmDataset& data) { move_frame(data, 1, "-10\\-20\\30"); });
+  refused("shows segment 9 in frame 1", [](DcmDataset& data) {
+    Uint8 pixels[72] = {0, 0, 9};
+    data.putAndInsertUint8Array(DCM_PixelData, pixels, 72);
+  });
+  refused("no segment but the background", [](DcmDataset& data) {
+    DcmSequenceOfItems* found = nullptr;
+    data.findAndGetSequence(DCM_SegmentSequence, found);
+    while (found->card() > 1) delete found->remove(1);
+  });
+}
+
+/// The voxels of all segments, one after the other.
+std::vector<std::uint8_t> all_voxels(const std::filesystem::path& path) {
+  std::vector<std::uint8_t> all;
+  for (const AnyVolume& volume : read_segments(path, read_segmentation_header(path))) {
+    const auto voxels = volume.as<std::uint8_t>();
+    all.insert(all.end(), voxels.begin(), voxels.end());
+  }
+  return all;
+}
+
+TEST(Segmentation, CompressedFramesHaveTheValuesOfPlainOnes) {
+  register_encoders();
+  const Scratch scratch;
+  for (const int bits : {0, 8, 16}) {
+    MadeSeg made{.fractional = bits == 0, .label_bits = bits, .segments = {7, 3}, .value = two_organs};
+    made.write(scratch / "plain");
+    const std::vector<std::uint8_t> plain = all_voxels(scratch / "plain");
+    EXPECT_GT(std::ranges::count(plain, 1), 10);
+    for (const E_TransferSyntax encoding : {EXS_RLELossless, EXS_JPEGLSLossless, EXS_JPEGProcess14SV1}) {
+      made.encoding = encoding;
+      made.write(scratch / "packed");
+      EXPECT_EQ(all_voxels(scratch / "packed"), plain) << bits << " " << encoding;
+    }
+  }
+}
+
+TEST(Segmentation, DamagedCompressedFramesAreRefused) {
+  const Scratch scratch;
+  std::string attributes;
+  MadeSeg{.label_bits = 8, .value = two_organs, .edit = [&](DcmDataset& data) { attributes = attributes_of(data); }}
+      .write(scratch / "seg");
+  const auto refused = [&](const std::vector<std::string>& fragments, const char* names) {
+    write_file(scratch / "seg", file_start(UID_RLELosslessTransferSyntax) + attributes + encapsulated(fragments));
+    try {
+      all_voxels(scratch / "seg");
+      FAIL() << names;
+    } catch (const InputError& error) {
+      EXPECT_TRUE(says(error.what(), {names, (scratch / "seg").string()}));
+    }
+  };
+  refused({std::string(64, '\0'), std::string(64, '\0'), std::string(64, '\0')}, "RLE");
+  refused({std::string(64, '\0'), std::string(64, '\0')}, "2 fragments of 3 frames");
+}
+
+TEST(Segmentation, FarMorePixelsThanBytesAreRefused) {
+  const Scratch scratch;
+  std::string attributes;
+  MadeSeg{.label_bits = 8,
+          .value = two_organs,
+          .edit =
+              [&](DcmDataset& data) {
+                MadeSeg::word(data, DCM_Rows, 65535);
+                MadeSeg::word(data, DCM_Columns, 65535);
+                attributes = attributes_of(data);
+              }}
+      .write(scratch / "seg");
+  write_file(scratch / "seg", file_start(UID_RLELosslessTransferSyntax) + attributes +
+                                  encapsulated(std::vector(3, std::string(64, '\0'))));
+  EXPECT_THROW(all_voxels(scratch / "seg"), InputError);
+}
+
+TEST(Segmentation, BitsThatAreCompressedAreRefusedByTheNameOfTheirCoding) {
   const Scratch scratch;
   for (const auto& [uid, name] : {std::pair{UID_RLELosslessTransferSyntax, "RLE Lossless"},
                                   std::pair{UID_JPEG2000LosslessOnlyTransferSyntax, "JPEG 2000"}}) {
