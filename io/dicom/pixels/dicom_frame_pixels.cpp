@@ -76,7 +76,7 @@ std::vector<std::uint16_t> FramePixels::frame(std::size_t number) const {
       header_.pixels.bits_allocated == 1;  // bits follow one another through all frames, the lowest first
   for (std::size_t pixel = 0; pixel < plane_; ++pixel) {
     const std::size_t at = first + pixel;
-    values[pixel] = is_bit ? bytes_[at / 8] >> (at % 8) & 1 : bytes_[at];
+    values[pixel] = static_cast<std::uint16_t>(is_bit ? bytes_[at / 8] >> (at % 8) & 1 : bytes_[at]);
   }
   return values;
 }
