@@ -26,7 +26,6 @@ namespace {
 
 constexpr std::int64_t kMostSlices = 2500;
 constexpr std::size_t kMostFrames = 1'000'000, kMostSegments = 65535;
-constexpr const char* kLabelMap = "1.2.840.10008.5.1.4.1.1.66.7";  // Label Map Segmentation Storage
 
 bool agree(const std::vector<double>& a, const std::vector<double>& b, double tolerance) {
   return std::ranges::equal(a, b, [=](double x, double y) { return std::abs(x - y) <= tolerance; });
@@ -40,7 +39,7 @@ class SegmentationFile {
     const OFCondition read = parse_dicom(format_, path, DCM_UndefinedTagKey).result;
     if (read.bad()) refuse(std::string("cannot be read as DICOM: ") + read.text());
     const std::string sop_class = text_of(data(), DCM_SOPClassUID);
-    if (sop_class != UID_SegmentationStorage && sop_class != kLabelMap) refuse("is no DICOM segmentation");
+    if (sop_class != UID_SegmentationStorage && sop_class != kLabelMapStorage) refuse("is no DICOM segmentation");
   }
 
   DicomSegmentation header(double otherwise_mm, const Geometry* volume);
@@ -103,7 +102,7 @@ DcmItem* SegmentationFile::group(DcmItem& frame, const DcmTagKey& sequence) {
 /// PS3.3 C.8.20.2: one bit a pixel, or eight, or in label maps sixteen.
 void SegmentationFile::read_bits(DicomSegmentation& seg) {
   const std::string type = text_of(data(), DCM_SegmentationType);
-  seg.label_map = text_of(data(), DCM_SOPClassUID) == kLabelMap;
+  seg.label_map = text_of(data(), DCM_SOPClassUID) == kLabelMapStorage;
   if (seg.label_map ? type != "LABELMAP" : type != "BINARY" && type != "FRACTIONAL")
     refuse("has Segmentation Type (0062,0001) " + known_code(type, {"BINARY", "FRACTIONAL", "LABELMAP"}) +
            ", expected " + (seg.label_map ? "LABELMAP" : "BINARY or FRACTIONAL"));
@@ -334,7 +333,7 @@ std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& heade
 
 bool is_dicom_segmentation(const std::filesystem::path& path) {
   const std::string sop_class = sop_class_of(path);
-  return sop_class == UID_SegmentationStorage || sop_class == kLabelMap;
+  return sop_class == UID_SegmentationStorage || sop_class == kLabelMapStorage;
 }
 
 DicomSegmentation read_segmentation_header(const std::filesystem::path& path, double otherwise_mm,

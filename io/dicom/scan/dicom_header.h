@@ -100,6 +100,9 @@ std::string text_of(DcmItem& item, const DcmTagKey& tag);
 /// The decimal strings of an attribute as numbers: exactly `count` of them, or none.
 std::optional<std::vector<double>> numbers_of(DcmItem& item, const DcmTagKey& tag, std::size_t count);
 
+/// SOP Class of Label Map Segmentations (PS3.4 B.5), which DCMTK 3.6.7 does not know.
+inline constexpr const char* kLabelMapStorage = "1.2.840.10008.5.1.4.1.1.66.7";
+
 /// The name of a UID, followed by the UID: "JPEG 2000 (Lossless only) (1.2.840.10008.1.2.4.90)"; the UID alone if it
 /// has no name.
 std::string uid_with_name(const std::string& uid);

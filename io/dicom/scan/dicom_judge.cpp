@@ -110,13 +110,18 @@ std::string rescale_problem(const DicomFileHeader& header) {
   return {};
 }
 
+/// The name of a UID, of transfer syntaxes in words; empty if it has none.
+std::string name_of(const std::string& uid) {
+  const DcmXfer syntax(uid.c_str());
+  if (syntax.getXfer() != EXS_Unknown) return syntax.getXferName();
+  if (const char* name = dcmFindNameOfUID(uid.c_str())) return name;
+  return uid == kLabelMapStorage ? "LabelMapSegmentationStorage" : name_of_newer_syntax(uid);
+}
+
 }  // namespace
 
 std::string uid_with_name(const std::string& uid) {
-  const DcmXfer syntax(uid.c_str());
-  const char* name = dcmFindNameOfUID(uid.c_str());
-  if (syntax.getXfer() != EXS_Unknown) name = syntax.getXferName();
-  const std::string found = name ? name : name_of_newer_syntax(uid);
+  const std::string found = name_of(uid);
   return found.empty() ? shown(uid) : found + " (" + shown(uid) + ")";
 }
 
@@ -143,6 +148,7 @@ std::string kind_name(const std::string& sop_class_uid) {
       {"RTIonPlan", "a radiotherapy plan"},
       {"RTImage", "an image of radiotherapy"},
       {"Segmentation", "a segmentation"},
+      {"LabelMapSegmentation", "a segmentation"},
       {"SpatialRegistration", "a registration"},
       {"DeformableSpatialRegistration", "a deformation"},
       {"GrayscaleSoftcopyPresentation", "display settings"},
@@ -155,10 +161,9 @@ std::string kind_name(const std::string& sop_class_uid) {
       {"EncapsulatedPDF", "a PDF document"},
       {"RawData", "raw data of a scanner"},
   };
-  const char* name = dcmFindNameOfUID(sop_class_uid.c_str());
-  const auto found = std::find_if(std::begin(kWords), std::end(kWords), [&](const Word& word) {
-    return name && std::string_view(name).starts_with(word.start);
-  });
+  const std::string name = name_of(sop_class_uid);
+  const auto found = std::find_if(std::begin(kWords), std::end(kWords),
+                                  [&](const Word& word) { return name.starts_with(word.start); });
   const std::string exact = uid_with_name(sop_class_uid);
   return found == std::end(kWords) ? exact : std::string(found->word) + ", " + exact;
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "io/dicom/scan/dicom_header.h"
 #include "tests/support/dicom/encapsulated.h"
 #include "tests/support/dicom/encoders.h"
 #include "tests/support/dicom/seg_maker.h"
@@ -187,6 +188,11 @@ TEST(Segmentation, OfALabelMapEachLabelIsASegment) {
       ASSERT_EQ(volumes[1].as<std::uint8_t>()[static_cast<std::size_t>(at)], second ? 1 : 0) << bits << " " << at;
     }
   }
+}
+
+TEST(Segmentation, IsCalledSoInAListOfFilesWhateverItsStorageClass) {
+  EXPECT_EQ(kind_name(UID_SegmentationStorage), "a segmentation, SegmentationStorage (1.2.840.10008.5.1.4.1.1.66.4)");
+  EXPECT_EQ(kind_name(kLabelMapStorage), "a segmentation, LabelMapSegmentationStorage (1.2.840.10008.5.1.4.1.1.66.7)");
 }
 
 TEST(Segmentation, LabelMapsThatContradictThemselvesAreRefused) {
