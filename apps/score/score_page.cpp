@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include <cmath>
 #include <cstdio>
 #include <span>
 
@@ -28,6 +29,12 @@ std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f", value);
   return text;
+}
+
+/// A value that is held against a limit; counts are whole numbers.
+std::string number(const ScoreLimit& limit, double value) {
+  const bool is_count = limit.name.ends_with("_voxels") && value == std::round(value);
+  return is_count ? std::to_string(std::llround(value)) : number(value);
 }
 
 std::string cells(std::initializer_list<std::string> texts) {
@@ -86,8 +93,8 @@ std::string case_section(const CaseScore& score) {
             number(score.gamma->largest_dose) + ".</p>\n";
   html += "<table><tr><th>limit</th><th>found</th><th>most</th><th></th><th>source</th></tr>\n";
   for (const ScoreCheck& one : score.checks)
-    html += cells({escaped(one.limit.about), number(one.value), number(one.limit.most), verdict_of(one.passed()),
-                   escaped(one.limit.source)});
+    html += cells({escaped(one.limit.about), number(one.limit, one.value), number(one.limit, one.limit.most),
+                   verdict_of(one.passed()), escaped(one.limit.source)});
   html += "</table>\n";
   if (!score.picture.empty()) {
     html += "<figure><img alt=\"errors in a slice\" src=\"data:image/png;base64," + base64(score.picture) +
@@ -139,8 +146,8 @@ std::string page_of(const std::string& set, const std::vector<CaseScore>& scores
   html += "<p>Limits, where it was measured:</p>\n<ul>\n";
   for (const ScoreLimit& limit : limits)
     html += "<li>" + escaped(limit.about) + ": " +
-            (limit.is_voxel_side ? "largest side of a voxel" : number(limit.most)) + " (" + escaped(limit.source) +
-            ")</li>\n";
+            (limit.is_voxel_side ? "largest side of a voxel" : number(limit, limit.most)) + " (" +
+            escaped(limit.source) + ")</li>\n";
   html += "</ul>\n";
   for (const CaseScore& score : scores) html += case_section(score);
   return html + "</body></html>\n";

@@ -148,17 +148,17 @@ def simpleitk_demons(moving: str, fixed: str, result: str) -> None:
 
 
 def simpleitk_bspline(moving: str, fixed: str, result: str) -> None:
-    """B-splines by L-BFGS-B in three resolutions, mean squares on a tenth of the voxels."""
+    """B-splines by L-BFGS in three resolutions with 2, 4 and 10 cells an axis, mean squares at 20 000 voxels."""
     import SimpleITK as sitk
 
     still, moved = (sitk.ReadImage(path, sitk.sitkFloat32) for path in (fixed, moving))
-    cells = [max(2, round(size * spacing / 100)) for size, spacing in zip(still.GetSize(), still.GetSpacing())]
+    factors, voxels = (4, 2, 1), still.GetNumberOfPixels()
     method = sitk.ImageRegistrationMethod()
-    method.SetInitialTransformAsBSpline(sitk.BSplineTransformInitializer(still, cells), True, [1, 2, 4])
+    method.SetInitialTransformAsBSpline(sitk.BSplineTransformInitializer(still, [2, 2, 2]), True, [1, 2, 5])
     method.SetMetricAsMeanSquares()
     method.SetMetricSamplingStrategy(method.RANDOM)
-    method.SetMetricSamplingPercentage(0.1, 1)
-    method.SetShrinkFactorsPerLevel([4, 2, 1])
+    method.SetMetricSamplingPercentagePerLevel([min(1.0, 20000 * factor**3 / voxels) for factor in factors], 1)
+    method.SetShrinkFactorsPerLevel(factors)
     method.SetSmoothingSigmasPerLevel([2, 1, 0])
     method.SetOptimizerAsLBFGS2(numberOfIterations=60)
     method.SetInterpolator(sitk.sitkLinear)

@@ -93,6 +93,7 @@ TEST_F(TruthProgram, TheTruthOfASetIsExact) {
   const std::string page = read_text(at("s.html")), table = read_text(at("s.csv"));
   EXPECT_NE(page.find("data:image/png;base64,iVBOR"), std::string::npos);
   EXPECT_NE(page.find("AAPM TG-132"), std::string::npos);
+  EXPECT_NE(page.find("0 or below</td><td>0</td><td>0</td>"), std::string::npos) << "counts are whole";
   EXPECT_NE(table.find("exact,shift,body,"), std::string::npos);
 }
 
