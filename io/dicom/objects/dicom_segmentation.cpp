@@ -292,8 +292,8 @@ DicomSegmentation SegmentationFile::header(double otherwise_mm, const Geometry* 
 std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& header) {
   const glm::i64vec3 size = header.geometry.size, shown = header.last - header.first + std::int64_t{1};
   const FramePixels pixels(format_, path_, header.frames.size(), "a segmentation");
-  std::vector<std::uint16_t> values =
-      pixels.frame(0);  // before anything is allocated that a damaged file may make large
+  // Decoded before anything is allocated that a damaged file may make large.
+  std::vector<std::uint16_t> values = pixels.frame(0);
   std::vector<AnyVolume> volumes;
   for (std::size_t n = 0; n < header.segments.size(); ++n) {
     volumes.emplace_back(header.geometry, VoxelType::u8);

@@ -49,7 +49,10 @@ void FramePixels::find_fragments(DcmDataset& data, std::size_t frames, const cha
     throw InputError(shown(header_.file) + " has no Pixel Data (7FE0,0010)");
   fragments_ = fragments_of(dynamic_cast<DcmPixelData&>(*element), header_);
   only_frame_ = frames == 1;
-  if (!only_frame_ && fragments_.size() != frames)
+  if (is_lossy(header_.transfer_syntax_uid))
+    refuse_pixels(header_, std::string("of ") + kind + ", a lossless coding is expected, found " +
+                               uid_with_name(header_.transfer_syntax_uid));
+  if (only_frame_ ? fragments_.empty() : fragments_.size() != frames)
     refuse_pixels(header_, std::string("of ") + kind + ", one fragment is expected of each frame; found " +
                                plural(fragments_.size(), "fragment") + " of " + plural(frames, "frame"));
   std::size_t stored = 0;
@@ -72,8 +75,8 @@ std::vector<std::uint16_t> FramePixels::frame(std::size_t number) const {
     return {words.begin(), words.end()};
   }
   std::vector<std::uint16_t> values(plane_);
-  const bool is_bit =
-      header_.pixels.bits_allocated == 1;  // bits follow one another through all frames, the lowest first
+  // Bits follow one another through all frames, the lowest first.
+  const bool is_bit = header_.pixels.bits_allocated == 1;
   for (std::size_t pixel = 0; pixel < plane_; ++pixel) {
     const std::size_t at = first + pixel;
     values[pixel] = static_cast<std::uint16_t>(is_bit ? bytes_[at / 8] >> (at % 8) & 1 : bytes_[at]);

@@ -19,7 +19,7 @@ class FramePixels {
   /// @param frames  how many frames the object has
   /// @param kind    the kind of object, for messages: "a segmentation"
   /// @throws InputError naming `path` for Pixel Data that are missing or of another length, of a coding that is not
-  /// read, without one fragment for each frame, or of so few bytes that so many pixels are no image
+  /// read or loses something, without one fragment for each frame, or of so few bytes that so many pixels are no image
   FramePixels(DcmFileFormat& format, const std::filesystem::path& path, std::size_t frames, const char* kind);
 
   /// @param number  of the frame, from 0

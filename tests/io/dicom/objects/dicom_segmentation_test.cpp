@@ -262,6 +262,25 @@ TEST(Segmentation, DamagedCompressedFramesAreRefused) {
   };
   refused({std::string(64, '\0'), std::string(64, '\0'), std::string(64, '\0')}, "RLE");
   refused({std::string(64, '\0'), std::string(64, '\0')}, "2 fragments of 3 frames");
+  MadeSeg{.slices = 1,
+          .label_bits = 8,
+          .value = [](int, int, int, int) { return 1; },
+          .edit = [&](DcmDataset& data) { attributes = attributes_of(data); }}
+      .write(scratch / "seg");
+  refused({std::string()}, "0 fragments of 1 frame");
+  refused({}, "0 fragments of 1 frame");
+}
+
+TEST(Segmentation, ACodingThatMayHaveChangedLabelsIsRefused) {
+  register_encoders();
+  const Scratch scratch;
+  MadeSeg{.label_bits = 8, .value = two_organs, .encoding = EXS_JPEGProcess1}.write(scratch / "seg");
+  try {
+    all_voxels(scratch / "seg");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_TRUE(says(error.what(), {"a lossless coding is expected, found JPEG Baseline", (scratch / "seg").string()}));
+  }
 }
 
 TEST(Segmentation, FarMorePixelsThanBytesAreRefused) {
