@@ -31,6 +31,21 @@ bool agree(const std::vector<double>& a, const std::vector<double>& b, double to
   return std::ranges::equal(a, b, [=](double x, double y) { return std::abs(x - y) <= tolerance; });
 }
 
+std::string in_frame(std::size_t frame) { return " in frame " + std::to_string(frame + 1); }
+
+/// Which segment has a number: its index, or how many segments there are where none has it.
+class LabelIndex {
+ public:
+  explicit LabelIndex(const DicomSegmentation& header) : index_(std::size_t{UINT16_MAX} + 1, header.segments.size()) {
+    for (std::size_t n = 0; n < header.segments.size(); ++n)
+      index_[static_cast<std::size_t>(header.segments[n].number)] = n;
+  }
+  std::size_t operator[](std::uint16_t number) const { return index_[number]; }
+
+ private:
+  std::vector<std::size_t> index_;
+};
+
 /// One Segmentation file, parsed.
 class SegmentationFile {
  public:
@@ -48,6 +63,10 @@ class SegmentationFile {
  private:
   DcmDataset& data() { return *format_.getDataset(); }
   [[noreturn]] void refuse(const std::string& what) const { throw InputError(shown(path_) + " " + what); }
+  [[noreturn]] void refuse_segment(int number, std::size_t frame) const {
+    refuse("shows segment " + std::to_string(number) + in_frame(frame) +
+           ", which its Segment Sequence (0062,0002) does not describe");
+  }
 
   int word(const DcmTagKey& tag);
   std::vector<double> numbers(DcmItem* group, const DcmTagKey& tag, std::size_t count);
@@ -190,9 +209,7 @@ std::size_t SegmentationFile::segment_of(const DicomSegmentation& seg, std::size
   if (!identification || identification->findAndGetUint16(DCM_ReferencedSegmentNumber, number).bad())
     refuse("does not say the segment of frame " + std::to_string(frame + 1));
   const auto segment = std::ranges::find(seg.segments, int{number}, &DicomSegmentation::Segment::number);
-  if (segment == seg.segments.end())
-    refuse("shows segment " + std::to_string(number) + " in frame " + std::to_string(frame + 1) +
-           ", which its Segment Sequence (0062,0002) does not describe");
+  if (segment == seg.segments.end()) refuse_segment(number, frame);
   return static_cast<std::size_t>(segment - seg.segments.begin());
 }
 
@@ -301,29 +318,22 @@ std::vector<AnyVolume> SegmentationFile::segments(const DicomSegmentation& heade
   }
   std::vector<std::span<std::uint8_t>> voxels;
   for (AnyVolume& volume : volumes) voxels.push_back(volume.as<std::uint8_t>());
-  std::vector<std::size_t> segment_of_label(header.label_map ? kMostSegments + 1 : 0, volumes.size());
-  for (std::size_t n = 0; n < header.segments.size() && header.label_map; ++n)
-    segment_of_label[static_cast<std::size_t>(header.segments[n].number)] = n;
+  const LabelIndex label_index(header);
   for (std::size_t n = 0; n < header.frames.size(); ++n) {
     if (n > 0) values = pixels.frame(n);
-    const std::string where = " in frame " + std::to_string(n + 1);
-    const std::int64_t corner = header.first.x + size.x * (header.first.y + size.y * header.frames[n].slice);
+    const auto& [segment_of_frame, slice] = header.frames[n];
+    const std::int64_t corner = header.first.x + size.x * (header.first.y + size.y * slice);
     for (std::size_t pixel = 0; pixel < values.size(); ++pixel) {
-      int value = values[pixel];
+      const std::uint16_t value = values[pixel];
       if (value == 0) continue;
-      std::size_t segment = header.frames[n].segment;
-      if (header.label_map) {
-        segment = segment_of_label[values[pixel]];
-        if (segment == volumes.size())
-          refuse("shows segment " + std::to_string(value) + where +
-                 ", which its Segment Sequence (0062,0002) does not describe");
-        value = 1;
-      } else if (value > header.largest) {
-        refuse("has the value " + std::to_string(value) + where + ", above " + tag_name(DCM_MaximumFractionalValue) +
-               " " + std::to_string(header.largest));
-      }
+      const std::size_t segment = header.label_map ? label_index[value] : segment_of_frame;
+      if (segment == volumes.size()) refuse_segment(value, n);
+      if (!header.label_map && value > header.largest)
+        refuse("has the value " + std::to_string(value) + in_frame(n) + ", above " +
+               tag_name(DCM_MaximumFractionalValue) + " " + std::to_string(header.largest));
       const auto at = static_cast<std::int64_t>(pixel), row = at / shown.x, column = at % shown.x;
-      voxels[segment][static_cast<std::size_t>(corner + row * size.x + column)] = static_cast<std::uint8_t>(value);
+      voxels[segment][static_cast<std::size_t>(corner + row * size.x + column)] =
+          static_cast<std::uint8_t>(header.label_map ? 1 : value);
     }
   }
   return volumes;

@@ -3,8 +3,6 @@
 
 #include "io/dicom/pixels/dicom_frame_pixels.h"
 
-#include <dcmtk/dcmdata/dcpixel.h>
-
 #include "deform/errors.h"
 #include "io/dicom/codecs/dicom_codecs.h"
 #include "io/dicom/pixels/dicom_pixels.h"
@@ -44,10 +42,7 @@ void FramePixels::find_native(DcmDataset& data, std::size_t frames, const char* 
 
 void FramePixels::find_fragments(DcmDataset& data, std::size_t frames, const char* kind) {
   constexpr std::size_t kMostPixelsAByte = 10'000;  // of an empty frame of 512 x 512, JPEG-LS makes more than 50 bytes
-  DcmElement* element = nullptr;
-  if (data.findAndGetElement(DCM_PixelData, element).bad() || !element)
-    throw InputError(shown(header_.file) + " has no Pixel Data (7FE0,0010)");
-  fragments_ = fragments_of(dynamic_cast<DcmPixelData&>(*element), header_);
+  fragments_ = fragments_of(data, header_);
   only_frame_ = frames == 1;
   if (is_lossy(header_.transfer_syntax_uid))
     refuse_pixels(header_, std::string("of ") + kind + ", a lossless coding is expected, found " +

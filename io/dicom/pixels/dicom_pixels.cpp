@@ -19,6 +19,14 @@
 namespace tetwarp {
 namespace {
 
+DcmPixelData& pixel_data_of(DcmDataset& data, const DicomFileHeader& header) {
+  DcmElement* element = nullptr;
+  data.findAndGetElement(DCM_PixelData, element);
+  auto* pixels = dynamic_cast<DcmPixelData*>(element);
+  if (!pixels) refuse_pixels(header, "expected Pixel Data (7FE0,0010), found none");
+  return *pixels;
+}
+
 std::vector<std::uint16_t> decode_bytes(std::span<const std::uint8_t> frame, const DicomFileHeader& header) {
   switch (pixel_coding(header.transfer_syntax_uid).value_or(PixelCoding::native)) {
     case PixelCoding::rle: return decode_rle(frame, header);
@@ -94,7 +102,8 @@ HuCount look_up(std::span<const std::uint16_t> words, const HuTable& table, cons
 
 }  // namespace
 
-std::vector<std::span<const std::byte>> fragments_of(DcmPixelData& pixels, const DicomFileHeader& header) {
+std::vector<std::span<const std::byte>> fragments_of(DcmDataset& data, const DicomFileHeader& header) {
+  DcmPixelData& pixels = pixel_data_of(data, header);
   E_TransferSyntax encoding = EXS_Unknown;
   const DcmRepresentationParameter* parameter = nullptr;
   DcmPixelSequence* sequence = nullptr;
@@ -106,9 +115,9 @@ std::vector<std::span<const std::byte>> fragments_of(DcmPixelData& pixels, const
   DcmObject* object = sequence->nextInContainer(nullptr);
   while (object && (object = sequence->nextInContainer(object))) {
     auto& item = dynamic_cast<DcmPixelItem&>(*object);
-    Uint8* data = nullptr;
-    if (item.getUint8Array(data).bad()) refuse_pixels(header, "expected a fragment, found none that can be read");
-    if (data) fragments.push_back(std::as_bytes(std::span(data, item.getLength())));
+    Uint8* bytes = nullptr;
+    if (item.getUint8Array(bytes).bad()) refuse_pixels(header, "expected a fragment, found none that can be read");
+    if (bytes) fragments.push_back(std::as_bytes(std::span(bytes, item.getLength())));
   }
   return fragments;
 }
@@ -125,12 +134,9 @@ std::vector<std::uint16_t> decode_frame(std::span<const std::span<const std::byt
 }
 
 std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header) {
-  DcmElement* element = nullptr;
-  data.findAndGetElement(DCM_PixelData, element);
-  auto* pixels = dynamic_cast<DcmPixelData*>(element);
-  if (!pixels) refuse_pixels(header, "expected Pixel Data (7FE0,0010), found none");
-  if (pixel_coding(header.transfer_syntax_uid) == PixelCoding::native) return native_words(*pixels, data, header);
-  return decode_frame(fragments_of(*pixels, header), header);
+  if (pixel_coding(header.transfer_syntax_uid) == PixelCoding::native)
+    return native_words(pixel_data_of(data, header), data, header);
+  return decode_frame(fragments_of(data, header), header);
 }
 
 std::vector<std::uint16_t> decode_slice(const ParsedSlice& slice) {

@@ -22,9 +22,9 @@ namespace tetwarp {
 /// @throws InputError naming the file for data that are truncated, damaged or of another size than the header says
 std::vector<std::uint16_t> decode_pixels(DcmDataset& data, const DicomFileHeader& header);
 
-/// The fragments of compressed Pixel Data (PS3.5 A.4), without the offset table.
+/// The fragments of an object's compressed Pixel Data (PS3.5 A.4), without the offset table.
 /// @throws InputError naming the file where there are none
-std::vector<std::span<const std::byte>> fragments_of(DcmPixelData& pixels, const DicomFileHeader& header);
+std::vector<std::span<const std::byte>> fragments_of(DcmDataset& data, const DicomFileHeader& header);
 
 /// Decodes the fragments of one compressed frame. It does not use the Basic Offset Table (PS3.5 A.4), which is often
 /// wrong and superfluous for one frame.

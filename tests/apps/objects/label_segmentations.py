@@ -11,7 +11,7 @@ import nibabel
 import numpy as np
 import pydicom
 
-from segmentations import compared, expected_of, masks_of, refused
+from segmentations import compared, expected_of, masks_of
 from world import TO_RAS, expect, moved, need, run, tool
 
 # --- dcmqi
@@ -160,6 +160,17 @@ def dcmqi_version():
 
 
 # --- pydicom-seg
+
+
+def refused(world, path, words):
+    done, _ = world.deform_with(path)
+    message = done.stderr.strip().replace(str(path), "FILE")
+    expect(
+        done.returncode == 4 and message.startswith("tetwarp: error: ") and "\n" not in message,
+        f"status {done.returncode}: {message}",
+    )
+    expect(all(word in message for word in words), f"says: {message}")
+    return "refused in one line"
 
 
 def check_pydicom_seg(module, world, own_frame, **options):

@@ -220,17 +220,6 @@ def by_shift(world):
     return list(padded[:, :k, 2 : 2 + j, :i]), world.affine
 
 
-def refused(world, path, words):
-    done, _ = world.deform_with(path)
-    message = done.stderr.strip().replace(str(path), "FILE")
-    expect(
-        done.returncode == 4 and message.startswith("tetwarp: error: ") and "\n" not in message,
-        f"status {done.returncode}: {message}",
-    )
-    expect(all(word in message for word in words), f"says: {message}")
-    return "refused in one line"
-
-
 def highdicom_cases():
     def case(run_it):
         return lambda world: run_it(Highdicom(), world)

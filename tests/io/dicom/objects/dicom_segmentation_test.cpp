@@ -262,6 +262,8 @@ TEST(Segmentation, DamagedCompressedFramesAreRefused) {
   };
   refused({std::string(64, '\0'), std::string(64, '\0'), std::string(64, '\0')}, "RLE");
   refused({std::string(64, '\0'), std::string(64, '\0')}, "2 fragments of 3 frames");
+  write_file(scratch / "seg", file_start(UID_RLELosslessTransferSyntax) + attributes);
+  EXPECT_THROW(all_voxels(scratch / "seg"), InputError) << "no Pixel Data at all";
   MadeSeg{.slices = 1,
           .label_bits = 8,
           .value = [](int, int, int, int) { return 1; },
