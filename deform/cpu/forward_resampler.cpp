@@ -7,9 +7,9 @@
 
 #include "deform/cpu/claims.h"
 #include "deform/cpu/coverage.h"
-#include "deform/cpu/interval_rows.h"
+#include "deform/cpu/intervals/interval_writer.h"
+#include "deform/cpu/intervals/lattice_raster.h"
 #include "deform/cpu/lattice_index.h"
-#include "deform/cpu/lattice_raster.h"
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/march.h"
 #include "deform/cpu/mesh_resampler.h"
@@ -38,7 +38,7 @@ struct TileVoxels {
   std::uint8_t mapped[kTile], coverage[kTile];
   // Of a coarse field:
   LatticeRaster raster;
-  IntervalRows rows;
+  IntervalWriter writer;
   std::vector<std::int32_t> fixed[3];  ///< U of each voxel, 2^-23 voxel
 
   void reset(std::int64_t voxels, bool coarse) {
@@ -48,7 +48,7 @@ struct TileVoxels {
     for (std::vector<std::int32_t>& axis : fixed) axis.resize(coarse ? room : 0);
   }
   /// U of a row that begins with voxel n.
-  FixedRow fixed_row(std::size_t n) const { return {{&fixed[0][n], &fixed[1][n], &fixed[2][n]}, {}}; }
+  FixedOffsets fixed_offsets(std::size_t n) const { return {{&fixed[0][n], &fixed[1][n], &fixed[2][n]}, {}}; }
 };
 
 /// Deforms volumes tile by tile: finds for each voxel where it comes from, then samples its rows. Voxels at rest are
@@ -102,6 +102,7 @@ class LatticeResampler final : public ForwardResampler {
              std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); });
     };
     const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
+    const TileTargets to{samplers, writer, form(), lattice_.frame().nudge};
     Report report = for_each_tile<TileVoxels>(
         arena_, region, control, finished, is_copied, [&](const Region& box, TileVoxels& tile) {
           if (!writer.wants_owners() && !writer.wants_tetrahedra() && rests(box))
@@ -109,9 +110,8 @@ class LatticeResampler final : public ForwardResampler {
           Report of_tile;
           const bool gathered = may_march && !mostly_folds(box) && gather(box, tile, of_tile.paths);
           if (!gathered && lattice_.frame().coarse) {
-            tile.raster.find(lattice_, box, writer.wants_owners(), tile.rows.tile);
             of_tile.paths.gathered += static_cast<std::uint64_t>(voxel_count(box));
-            write_intervals(box, tile, samplers, writer, of_tile);
+            write_intervals(box, tile, to, of_tile);
             return of_tile;
           }
           if (!gathered) claim_all(box, tile, writer, of_tile.paths);
@@ -167,7 +167,7 @@ class LatticeResampler final : public ForwardResampler {
     const auto width = static_cast<int>(box.end.x - box.begin.x);
     const glm::vec3 offset[kTile] = {};
     const std::int32_t none[kTile] = {};
-    const FixedRow fixed{{none, none, none}, {}};
+    const FixedOffsets fixed{{none, none, none}, {}};
     float jacobian[kTile];
     std::fill_n(jacobian, width, 1.0f);
     std::fill_n(tile.mapped, width, std::uint8_t{1});
@@ -185,17 +185,17 @@ class LatticeResampler final : public ForwardResampler {
 
   /// Whether tetrahedra have so many voxels that rows of them are found faster than voxels, one after the other.
   bool has_large_cells() const {
-    constexpr float kLarge = 6 * 6 * 6;  // voxels
+    constexpr float kLarge = 3.5f * 3.5f * 3.5f;  // voxels
     const glm::vec3 cell = lattice_.steps().cell * kVoxelsPerStep;
     return cell.x * cell.y * cell.z >= kLarge;
   }
 
-  /// Samples the rows of a tile of a coarse field whose owners are known.
-  void write_intervals(const Region& box, TileVoxels& tile, const TargetSamplers& samplers, const MapWriter& maps,
-                       Report& report) const {
+  /// Finds the owners of a tile of a coarse field, and samples their voxels.
+  void write_intervals(const Region& box, TileVoxels& tile, const TileTargets& to, Report& report) const {
     const bool rest = lattice_.field().outside == Outside::rest;
-    tile.rows.write(
-        form(), lattice_.frame().nudge, samplers, maps,
+    tile.writer.prepare(to);
+    tile.raster.find(lattice_, box, to.maps.wants_owners(), tile.writer.tile, &tile.writer);
+    tile.writer.finish(
         [&](std::int64_t y, std::int64_t z) {
           std::uint32_t outside = 0;
           for (std::int64_t x = box.begin.x; rest && x < box.end.x; ++x)
@@ -340,7 +340,7 @@ class LatticeResampler final : public ForwardResampler {
     std::size_t first = 0;
     for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y, first += static_cast<std::size_t>(width)) {
-        const FixedRow fixed = coarse ? tile.fixed_row(first) : FixedRow{};
+        const FixedOffsets fixed = coarse ? tile.fixed_offsets(first) : FixedOffsets{};
         const Row row{{box.begin.x, y, z},
                       width,
                       tile.mapped,

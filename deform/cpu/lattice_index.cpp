@@ -75,6 +75,24 @@ bool LatticeIndex::reaches(const Box& box, const Region& region) {
   return true;
 }
 
+/// The blocks that reach a region, and perhaps some more: those whose cells lie, undeformed, no further from it than
+/// vertices move.
+Region LatticeIndex::blocks_near(const Region& region) const {
+  Region near{glm::i64vec3(0), blocks_};
+  for (int axis = 0; axis < 3 && steps_.cells.x != 0; ++axis) {
+    const double cell = steps_.cell[axis], first = steps_.first[axis], moved = statistics_.most_moved;
+    const auto block_at = [&](double steps) {
+      return std::floor((steps - first) / (cell * static_cast<double>(cells_per_block_[axis])));
+    };
+    const double last = static_cast<double>(blocks_[axis] - 1),
+                 from = block_at(static_cast<double>(region.begin[axis] * kStepsPerVoxel) - moved) - 1,
+                 to = block_at(static_cast<double>((region.end[axis] - 1) * kStepsPerVoxel) + moved) + 1;
+    near.begin[axis] = static_cast<std::int64_t>(std::clamp(from, 0.0, last));
+    near.end[axis] = static_cast<std::int64_t>(std::clamp(to, 0.0, last)) + 1;
+  }
+  return near;
+}
+
 void LatticeIndex::build(const Geometry& output, const FieldView& field, const Control& control) {
   field_ = field;
   frame_ = make_lattice_frame(output, field);

@@ -85,10 +85,11 @@ class LatticeIndex {
   /// Calls `visit(block)` for the number of every block whose box may reach the region.
   template <class Visit>
   void find_blocks(const Region& region, Visit&& visit) const {
+    const Region near = blocks_near(region);
     for (std::size_t group = 0; group < group_boxes_.size(); ++group) {
       if (!reaches(group_boxes_[group], region)) continue;
-      const glm::i64vec3 begin = glm::i64vec3(unravel(group, groups_)) * kGroup;
-      const glm::i64vec3 end = glm::min(begin + kGroup, blocks_);
+      const glm::i64vec3 first = glm::i64vec3(unravel(group, groups_)) * kGroup;
+      const glm::i64vec3 begin = glm::max(first, near.begin), end = glm::min(first + kGroup, near.end);
       for (std::int64_t z = begin.z; z < end.z; ++z) {
         for (std::int64_t y = begin.y; y < end.y; ++y) {
           for (std::int64_t x = begin.x; x < end.x; ++x) {
@@ -122,6 +123,7 @@ class LatticeIndex {
   static constexpr std::int64_t kGroup = 8;
 
   static bool reaches(const Box& box, const Region& region);
+  Region blocks_near(const Region& region) const;
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
   Vertex snapped(const glm::i64vec3& at, const glm::vec3& displacement) const {
     Vertex vertex;

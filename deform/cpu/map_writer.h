@@ -43,6 +43,12 @@ class MapWriter {
   /// @param row       its voxels, which the maps must buffer
   /// @param coverage  1 or 0 for each voxel of the row
   void write(const Row& row, const std::uint8_t* coverage, const OwnerRow& of_owners = {}) const;
+  /// The same of a list of voxels, but for how many own each.
+  void write(const VoxelList& list, const std::uint8_t* coverage, const OwnerRow& of_owners) const;
+  /// Writes how many own each voxel of a row.
+  void write_owners(const glm::i64vec3& voxel, int count, const std::uint16_t* owners) const;
+  /// Writes to each map, but that, that nothing maps to a run of voxels along i.
+  void clear(const glm::i64vec3& voxel, int count) const;
 
  private:
   Maps maps_;

@@ -7,8 +7,8 @@
 #include <bit>
 #include <glm/common.hpp>
 
-#include "deform/cpu/interval_rows.h"
-#include "deform/cpu/mesh_raster.h"
+#include "deform/cpu/intervals/interval_writer.h"
+#include "deform/cpu/intervals/mesh_raster.h"
 #include "deform/cpu/tiles.h"
 #include "deform/target_check.h"
 
@@ -18,7 +18,7 @@ namespace {
 
 /// What a task works with.
 struct Scratch {
-  IntervalRows rows;
+  IntervalWriter writer;
   IntervalTile at_rest;  ///< owners in the undeformed mesh
 };
 
@@ -60,7 +60,7 @@ void MeshResampler::require_reach(const Control& control) {
   std::atomic<std::int64_t> voxels = 0, lowest = INT64_MAX;
   for_each_tile<IntervalTile>(
       arena_, whole(output()), {.stop = control.stop}, {}, [&](const Region& box, IntervalTile& tile) {
-        rest_raster_.find(box, false, tile);
+        rest_raster_.find(box, false, tile, nullptr);
         const std::uint32_t all = ~0u >> (kTile - (box.end.x - box.begin.x));
         for (std::int64_t z = box.begin.z; z < box.end.z; ++z) {
           for (std::int64_t y = box.begin.y; y < box.end.y; ++y) {
@@ -89,14 +89,14 @@ Report MeshResampler::resample(Region region, std::span<const Target> targets, c
   const TargetSamplers samplers = make_samplers(*this, targets, region);
   const MapWriter writer(maps, output(), region);
   require_numbers(maps, mesh_.tetrahedra.size());
-  const PlaceForm form(mesh_.coarse, mesh_.most_moved);
+  const TileTargets to{samplers, writer, PlaceForm(mesh_.coarse, mesh_.most_moved), mesh_.nudge};
   Report report = for_each_tile<Scratch>(arena_, region, control, finished, [&](const Region& box, Scratch& scratch) {
     Report of_tile;
     of_tile.paths.claimed = static_cast<std::uint64_t>(voxel_count(box));
-    raster_.find(box, writer.wants_owners(), scratch.rows.tile);
-    if (stays_outside_) rest_raster_.find(box, false, scratch.at_rest);
-    scratch.rows.write(
-        form, mesh_.nudge, samplers, writer,
+    if (stays_outside_) rest_raster_.find(box, false, scratch.at_rest, nullptr);
+    scratch.writer.prepare(to);
+    raster_.find(box, writer.wants_owners(), scratch.writer.tile, &scratch.writer);
+    scratch.writer.finish(
         [&](std::int64_t y, std::int64_t z) { return stays_outside_ ? ~scratch.at_rest.covered(y, z) : 0u; }, of_tile);
     return of_tile;
   });

@@ -23,28 +23,69 @@ class TypedSampler final : public TargetSampler {
         slices_(uneven_slices(*target.source.geometry)),
         plan_(plan_target(target, relate(*target.source.geometry, output, slices_.empty() ? nullptr : slices_.data()),
                           reinterpret_cast<const V*>(target.source.voxels))) {
-    if constexpr (kVectors) has_source_ = LinearSource::make(plan_, voxel_count(target.source.buffered), source_);
+    if constexpr (kVectors) {
+      has_source_ = components() == 1 && LinearSource::make(plan_, voxel_count(target.source.buffered), source_);
+    }
   }
 
   void sample(const Row& row, LinearPlaces& places, std::uint8_t* coverage, Report& counts) const override {
     V* output = output_at(row.voxel);
     SliceRange sampled;
-    if (components() > 1) {
-      sample_vectors(row, output, coverage, counts, sampled);
-    } else if (has_source_ && row.count <= kMostInRow) {
+    const auto to = [&](int i) { return output + i * components(); };
+    const auto slices = [&](int) -> SliceRange& { return sampled; };
+    if (has_source_ && row.count <= kMostTogether) {
       places.find(source_.layout, row);
-      sampled = places.slices;
       // Voxels that vectors left are written below.
       if (coverage) std::fill_n(coverage, row.count, std::uint8_t{1});
-      if (kInterpolation == Interpolation::vote)
-        sample_vote_row(source_, places, output);
-      else
-        sample_linear_row(source_, places, output);
-      sample_left(row, places, output, coverage, counts, sampled);
+      sample_places(places, output);
+      if (kInterpolation != Interpolation::nearest)
+        sampled = places.slices;
+      else if (wants_slices())
+        note_places(row, places, slices);
+      sample_left(row, places, to, coverage, counts, slices);
     } else {
-      for (int i = 0; i < row.count; ++i) sample_one(row, i, output, coverage, counts, sampled);
+      for (int i = 0; i < row.count; ++i) sample_one(row, i, to(i), coverage, counts, sampled);
     }
-    if (!target_.sampled_slices.empty()) note_slices(row.voxel.z, sampled);
+    if (wants_slices()) note_slices(row.voxel.z, sampled);
+  }
+
+  void sample(const VoxelList& list, LinearPlaces& places, std::uint8_t* coverage, Report& counts,
+              TileSlices* slices) const override {
+    V* output = output_at(list.first);
+    const glm::i64vec3 size = target_.output.buffered.end - target_.output.buffered.begin;
+    const std::int64_t row = size.x * components(), slice = size.x * size.y * components();
+    const auto to = [&](int i) {
+      const glm::i64vec3 in(list.in_tile_at(i));
+      return output + (in.z * slice + in.y * row + in.x * components());
+    };
+    SliceRange not_noted;
+    const auto slices_of = [&](int i) -> SliceRange& {
+      return slices ? (*slices)[static_cast<std::size_t>(list.in_tile_at(i).z)] : not_noted;
+    };
+    if (coverage) std::fill_n(coverage, list.count, std::uint8_t{1});
+    if (!has_source_) {
+      for (int i = 0; i < list.count; ++i) sample_one(list, i, to(i), coverage, counts, slices_of(i));
+      return;
+    }
+    places.find(source_.layout, list);
+    V values[kRoomTogether];
+    std::int32_t steps[kRoomTogether];
+    sample_places(places, values);
+    find_steps(list, static_cast<std::int32_t>(row), static_cast<std::int32_t>(slice), steps);
+    for (int i = 0; i < list.count; ++i) output[steps[i]] = values[i];
+    if (slices) note_places(list, places, slices_of);
+    sample_left(list, places, to, coverage, counts, slices_of);
+  }
+
+  void clear(const glm::i64vec3& voxel, int count, Report& counts) const override {
+    std::fill_n(output_at(voxel), count * components(), plan_.background);
+    counts.uncovered += static_cast<std::uint64_t>(count);
+    if (plan_.background_saturated) counts.clamped += static_cast<std::uint64_t>(count);
+  }
+
+  bool wants_slices() const override { return !target_.sampled_slices.empty(); }
+  void note(std::int64_t begin, const TileSlices& slices) const override {
+    for (std::size_t z = 0; z < slices.size(); ++z) note_slices(begin + static_cast<std::int64_t>(z), slices[z]);
   }
 
   bool can_copy(const Region& box) const override {
@@ -61,14 +102,15 @@ class TypedSampler final : public TargetSampler {
       V* to = output_at(first);
       const std::int64_t step = (target_.output.buffered.end.x - target_.output.buffered.begin.x) * components();
       for (std::int64_t y = box.begin.y; y < box.end.y; ++y, from += stride.y, to += step) std::copy_n(from, width, to);
-      if (!target_.sampled_slices.empty()) note_slices(z, {z, z});
+      if (wants_slices()) note_slices(z, {z, z});
     }
     counts.covered += static_cast<std::uint64_t>(voxel_count(box));
   }
 
  private:
   static constexpr bool kVectors =
-      (kInterpolation == Interpolation::linear || kInterpolation == Interpolation::vote) && kHasLinearRow<V>;
+      kInterpolation == Interpolation::nearest ||
+      ((kInterpolation == Interpolation::linear || kInterpolation == Interpolation::vote) && kHasLinearRow<V>);
 
   int components() const { return target_.source.components; }
   V* output_at(const glm::i64vec3& voxel) const {
@@ -76,38 +118,55 @@ class TypedSampler final : public TargetSampler {
            buffer_index(target_.output, voxel) * static_cast<std::size_t>(components());
   }
 
-  /// Calls `work` with the offset of voxel i of a row, in the type that its field has.
-  template <class Work>
-  static auto with_offset(const Row& row, int i, Work&& work) {
-    return row.fixed ? work(row.fixed->at(i)) : work(row.offset[i]);
-  }
-
-  /// Samples the voxels that vectors did not.
-  void sample_left(const Row& row, const LinearPlaces& places, V* output, std::uint8_t* coverage, Report& counts,
-                   SliceRange& sampled) const {
-    counts.covered += static_cast<std::uint64_t>(places.sampled);
-    if (places.sampled == row.count) return;
-    for (int i = 0; i < row.count; ++i)
-      if (places.state[i] == RowState::left) sample_one(row, i, output, coverage, counts, sampled);
-  }
-
-  void sample_one(const Row& row, int i, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
-    const SampledVoxel<V> voxel = with_offset(row, i, [&](const auto& offset) {
-      return sample_voxel<V, kInterpolation>(plan_, row.voxel + glm::i64vec3(i, 0, 0), row.mapped[i] != 0, offset);
-    });
-    output[i] = voxel.value;
-    note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
-  }
-
-  /// Samples all voxels of a row whose voxels have several values each.
-  void sample_vectors(const Row& row, V* output, std::uint8_t* coverage, Report& counts, SliceRange& sampled) const {
-    for (int i = 0; i < row.count; ++i, output += components()) {
-      const SampledVoxel<V> voxel = with_offset(row, i, [&](const auto& offset) {
-        return sample_components<V, kInterpolation>(plan_, components(), row.voxel + glm::i64vec3(i, 0, 0),
-                                                    row.mapped[i] != 0, offset, output);
-      });
-      note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
+  /// Samples the voxels that vectors can.
+  void sample_places(const LinearPlaces& places, V* values) const {
+    if constexpr (kInterpolation == Interpolation::nearest) {
+      sample_nearest_row(source_.layout, plan_.source.voxels, places, values);
+    } else if (kInterpolation == Interpolation::vote) {
+      sample_vote_row(source_, places, values);
+    } else {
+      sample_linear_row(source_, places, values);
     }
+  }
+
+  /// Adds the slices of the source from which those were sampled. @param slices  the range of the i-th voxel
+  template <class Voxels, class Slices>
+  static void note_places(const Voxels& voxels, const LinearPlaces& places, const Slices& slices) {
+    for (int i = 0; i < voxels.count; ++i) {
+      if (places.state[i] != RowState::sampled) continue;
+      SliceRange& of = slices(i);
+      std::int64_t first = 0, last = 0;
+      slices_at<kInterpolation>({{0, 0, places.slice[i]}, {0, 0, places.z[i]}}, INT64_MAX, first, last);
+      of.first = std::min(of.first, first);
+      of.last = std::max(of.last, last);
+    }
+  }
+
+  /// Samples the voxels that vectors did not. @param to, slices  the output and the range of slices of the i-th voxel
+  template <class Voxels, class To, class Slices>
+  void sample_left(const Voxels& voxels, const LinearPlaces& places, const To& to, std::uint8_t* coverage,
+                   Report& counts, const Slices& slices) const {
+    counts.covered += static_cast<std::uint64_t>(places.sampled);
+    if (places.sampled == voxels.count) return;
+    for (int i = 0; i < voxels.count; ++i)
+      if (places.state[i] == RowState::left) sample_one(voxels, i, to(i), coverage, counts, slices(i));
+  }
+
+  /// Samples the i-th voxel, whatever it is.
+  template <class Voxels>
+  void sample_one(const Voxels& voxels, int i, V* output, std::uint8_t* coverage, Report& counts,
+                  SliceRange& sampled) const {
+    const auto at = [&](const auto& offset) {
+      const glm::i64vec3 voxel = voxels.voxel_at(i);
+      if (components() > 1) {
+        return sample_components<V, kInterpolation>(plan_, components(), voxel, voxels.is_mapped(i), offset, output);
+      }
+      const SampledVoxel<V> found = sample_voxel<V, kInterpolation>(plan_, voxel, voxels.is_mapped(i), offset);
+      *output = found.value;
+      return found;
+    };
+    const SampledVoxel<V> voxel = voxels.fixed ? at(voxels.fixed->at(i)) : at(voxels.offset[i]);
+    note_voxel(voxel, coverage ? coverage + i : nullptr, counts, sampled);
   }
 
   static void note_voxel(const SampledVoxel<V>& voxel, std::uint8_t* coverage, Report& counts, SliceRange& sampled) {
@@ -177,6 +236,29 @@ void sample_targets(const Row& row, const TargetSamplers& samplers, std::uint8_t
   for (std::size_t n = 1; n < samplers.size(); ++n) {
     Report not_counted;
     samplers[n]->sample(row, places, nullptr, not_counted);
+  }
+}
+
+void clear_targets(const glm::i64vec3& voxel, int count, const TargetSamplers& samplers, Report& report) {
+  if (samplers.empty()) report.uncovered += static_cast<std::uint64_t>(count);
+  for (std::size_t n = 0; n < samplers.size(); ++n) {
+    Report not_counted;
+    samplers[n]->clear(voxel, count, n == 0 ? report : not_counted);
+  }
+}
+
+void sample_targets(const VoxelList& list, const TargetSamplers& samplers, std::uint8_t* coverage, Report& report,
+                    TileSlices* slices) {
+  if (samplers.empty()) {
+    std::fill_n(coverage, list.count, std::uint8_t{1});
+    report.covered += static_cast<std::uint64_t>(list.count);
+    return;
+  }
+  LinearPlaces places;
+  for (std::size_t n = 0; n < samplers.size(); ++n) {
+    Report not_counted;
+    samplers[n]->sample(list, places, n == 0 ? coverage : nullptr, n == 0 ? report : not_counted,
+                        samplers[n]->wants_slices() ? slices + n : nullptr);
   }
 }
 

@@ -72,18 +72,21 @@ template <class Offset>
 struct RowOffsets;
 template <>
 struct RowOffsets<glm::vec3> {  // of a dense one
-  glm::vec3 offset[kMostInRow];
+  glm::vec3 offset[kRoomTogether];
 
   void fill(Random& random, int i) {
     offset[i] = {random_offset(random), random_offset(random), random_offset(random)};
   }
-  void put(Row& row) const { row.offset = offset; }
+  template <class Voxels>
+  void put(Voxels& voxels) const {
+    voxels.offset = offset;
+  }
   glm::vec3 at(int i) const { return offset[i]; }
 };
 template <>
 struct RowOffsets<FixedOffset> {  // of a coarse one
-  std::int32_t u[3][kMostInRow];
-  FixedRow fixed{{u[0], u[1], u[2]}, {}};
+  std::int32_t u[3][kRoomTogether];
+  FixedOffsets fixed{{u[0], u[1], u[2]}, {}};
 
   void fill(Random& random, int i) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -92,7 +95,10 @@ struct RowOffsets<FixedOffset> {  // of a coarse one
       u[axis][i] = random.chance(0.1) ? static_cast<std::int32_t>(random.integer(-3, 3)) : some;
     }
   }
-  void put(Row& row) const { row.fixed = &fixed; }
+  template <class Voxels>
+  void put(Voxels& voxels) const {
+    voxels.fixed = &fixed;
+  }
   FixedOffset at(int i) const { return fixed.at(i); }
 };
 
@@ -151,11 +157,87 @@ void expect_same_bits(V (*value)(Random&),
         expected_slices.last = std::max(expected_slices.last, expected.last_slice);
         ++sampled;
       }
+      if (kInterpolation == Interpolation::nearest) continue;
       ASSERT_EQ(places.slices.first, expected_slices.first);
       ASSERT_EQ(places.slices.last, expected_slices.last);
     }
   }
   EXPECT_GT(sampled, 1000 * sets) << "hardly anything is sampled with vectors";
+}
+
+/// The same of lists of voxels, from a source that is held as a whole.
+template <Interpolation kInterpolation, class Offset, class V>
+void expect_same_bits_in_lists(V (*value)(Random&),
+                               void (*sample)(const LinearSource& source, const LinearPlaces& places, void* output)) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  const glm::i64vec3 size(47, 31, 29);
+  int sampled = 0, sets = 0;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    const OnInstructionSet on(target);
+    ++sets;
+    Random random(test_seed(), 41);
+    std::vector<V> voxels(static_cast<std::size_t>(size.x * size.y * size.z));
+    for (V& voxel : voxels) voxel = value(random);
+    SamplePlan<V> plan{};
+    plan.source = {voxels.data(), size, glm::i64vec3(0), glm::i64vec3(1, size.x, size.x * size.y)};
+    plan.relation.same_grid = true;
+    LinearSource source;
+    ASSERT_TRUE(LinearSource::make(plan, static_cast<std::int64_t>(voxels.size()), source));
+    for (int n = 0; n < 50; ++n) {
+      std::uint16_t numbers[kRoomTogether];
+      for (std::uint16_t& number : numbers) number = static_cast<std::uint16_t>(random.integer(0, 32767));
+      RowOffsets<Offset> offsets;
+      VoxelList list{{random.integer(0, 20), random.integer(0, 9), random.integer(0, 9)},
+                     static_cast<int>(random.integer(1, kMostTogether)),
+                     numbers,
+                     nullptr,
+                     nullptr};
+      offsets.put(list);
+      for (int i = 0; i < list.count; ++i) offsets.fill(random, i);
+      V output[kRoomTogether];
+      std::int32_t steps[kRoomTogether];
+      LinearPlaces places;
+      places.find(source.layout, list);
+      sample(source, places, output);
+      find_steps(list, 100, 10000, steps);
+      int found = 0;
+      for (int i = 0; i < list.count; ++i) {
+        const glm::ivec3 in = list.in_tile_at(i);
+        ASSERT_EQ(steps[i], in.x + 100 * in.y + 10000 * in.z) << hwy::TargetName(target);
+        if (places.state[i] == RowState::left) continue;
+        ++found;
+        const SampledVoxel<V> expected = sample_voxel<V, kInterpolation>(plan, list.voxel_at(i), true, offsets.at(i));
+        ASSERT_TRUE(expected.inside);
+        ASSERT_EQ(std::memcmp(&output[i], &expected.value, sizeof(V)), 0)
+            << hwy::TargetName(target) << ", voxel " << i << ": " << +output[i] << ", expected " << +expected.value;
+        if (kInterpolation == Interpolation::nearest) continue;
+        ASSERT_EQ(places.slice[i], expected.first_slice);
+        ASSERT_EQ(places.slice[i] + (places.z[i] != 0), expected.last_slice);
+      }
+      ASSERT_EQ(places.sampled, found);
+      sampled += found;
+    }
+  }
+  EXPECT_GT(sampled, 1000 * sets) << "hardly anything is sampled with vectors";
+}
+
+TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherInLists) {
+  expect_same_bits_in_lists<Interpolation::linear, glm::vec3>(&random_value<TypeParam>, &sample_linear_row);
+  expect_same_bits_in_lists<Interpolation::linear, FixedOffset>(&random_value<TypeParam>, &sample_linear_row);
+  expect_same_bits_in_lists<Interpolation::vote, FixedOffset>(&random_label<TypeParam>, &sample_vote_row);
+}
+
+/// Reads the nearest voxels of a source.
+template <class V>
+void sample_nearest_voxels(const LinearSource& source, const LinearPlaces& places, void* output) {
+  sample_nearest_row(source.layout, static_cast<const V*>(source.voxels), places, static_cast<V*>(output));
+}
+
+TYPED_TEST(LinearRow, FindsTheNearestVoxelOfOneAfterTheOther) {
+  expect_same_bits<Interpolation::nearest, glm::vec3>(&random_value<TypeParam>, &sample_nearest_voxels<TypeParam>);
+  expect_same_bits<Interpolation::nearest, FixedOffset>(&random_value<TypeParam>, &sample_nearest_voxels<TypeParam>);
+  expect_same_bits_in_lists<Interpolation::nearest, FixedOffset>(&random_value<TypeParam>,
+                                                                 &sample_nearest_voxels<TypeParam>);
 }
 
 TYPED_TEST(LinearRow, GivesTheBitsOfOneVoxelAfterTheOtherOnEveryInstructionSet) {
@@ -182,13 +264,13 @@ TEST(LinearRowRounding, OfCoarseFieldsIsDoneOnceOnEveryInstructionSet) {
   plan.relation.same_grid = true;
   LinearSource source;
   ASSERT_TRUE(LinearSource::make(plan, static_cast<std::int64_t>(voxels.size()), source));
-  std::int32_t u[3][kMostInRow] = {};
+  std::int32_t u[3][kMostTogether] = {};
   std::uint8_t mapped[kCount];
   for (int i = 0; i < kCount; ++i) {
     u[0][i] = 3 << 21;
     mapped[i] = 1;
   }
-  const FixedRow fixed{{u[0], u[1], u[2]}, {}};
+  const FixedOffsets fixed{{u[0], u[1], u[2]}, {}};
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     const OnInstructionSet on(target);
     const Row row{{0, 0, 0}, kCount, mapped, nullptr, &fixed};

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Rows of a tetrahedron scanned with vectors, for every instruction set that the processor has, against exact integers;
-// and U of rows, against one voxel after the other.
+// and lists of voxels and their U, against one voxel after the other.
 #include "deform/cpu/rows/row_scan.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <map>
 #include <set>
 
-#include "deform/cpu/rows/fixed_row.h"
+#include "deform/cpu/rows/fixed_list.h"
 #include "tests/support/instruction_set.h"
 #include "tests/support/random.h"
 
@@ -72,38 +72,67 @@ TEST(RowScans, SayWhatExactIntegersSayOnEveryInstructionSet) {
   }
 }
 
-TEST(RowScans, FixedRowsHaveUOfEveryVoxelOnEveryInstructionSet) {
+TEST(RowScans, ListTheVoxelsOfRowsOnEveryInstructionSet) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    const OnInstructionSet on(target);
+    Random random(test_seed(), 83);
+    for (int n = 0; n < 500; ++n) {
+      const auto count = static_cast<int>(random.integer(1, 40));
+      std::vector<std::uint16_t> rows, expected;
+      std::vector<std::uint32_t> bits;
+      for (int row = 0; row < count; ++row) {
+        const std::uint32_t runs[] = {~0u, 1u << 31, 1u, 0x7ffffff0u,
+                                      static_cast<std::uint32_t>(random.integer(0, UINT32_MAX))};
+        rows.push_back(static_cast<std::uint16_t>(random.integer(0, RowScan::kMost - 1)));
+        bits.push_back(random.one_of(runs));
+        for (int x = 0; x < kMostRowTile; ++x) {
+          if (bits.back() >> x & 1) expected.push_back(static_cast<std::uint16_t>(rows.back() * kMostRowTile + x));
+        }
+      }
+      constexpr int kRoom = 100;
+      std::uint16_t numbers[kRoom + 16];
+      std::vector<std::uint16_t> found;
+      auto before = static_cast<int>(random.integer(0, kRoom - kMostRowTile));
+      for (int done = 0; done < count; before = 0) {
+        int listed = before;
+        const int some = list_voxels(rows.data() + done, bits.data() + done, count - done, numbers, listed, kRoom);
+        ASSERT_GT(some, 0);
+        ASSERT_LE(listed, kRoom);
+        done += some;
+        found.insert(found.end(), numbers + before, numbers + listed);
+      }
+      ASSERT_EQ(found, expected) << hwy::TargetName(target);
+    }
+  }
+}
+
+CoarseMap random_map(Random& random, const glm::ivec3& near) {
+  CoarseMap map;
+  for (int axis = 0; axis < 3; ++axis) {
+    map.origin[axis] = near[axis] + static_cast<int>(random.integer(-20, 50));
+    map.at_origin[axis] = random.integer(-(1 << 29), 1 << 29);
+    for (glm::i32vec3& slope : map.slope) slope[axis] = static_cast<int>(random.integer(-(1 << 22), 1 << 22));
+  }
+  return map;
+}
+
+TEST(FixedLists, HaveUOfEveryVoxelOnEveryInstructionSet) {
   SCOPED_TRACE(seed_text(test_seed()));
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     const OnInstructionSet on(target);
     Random random(test_seed(), 82);
-    for (int n = 0; n < 2000; ++n) {
+    for (int n = 0; n < 500; ++n) {
       const glm::ivec3 first(random.integer(-40, 500), random.integer(0, 500), random.integer(0, 500));
-      std::vector<CoarseMap> maps;
-      std::vector<TileMap> of_tile;
-      std::vector<RowRun> runs;
-      for (int begin = static_cast<int>(random.integer(0, 5)); begin < 32;) {
-        CoarseMap map;
-        for (int axis = 0; axis < 3; ++axis) {
-          map.origin[axis] = first[axis] + static_cast<int>(random.integer(-20, 50));
-          map.at_origin[axis] = random.integer(-(1 << 29), 1 << 29);
-          for (glm::i32vec3& slope : map.slope) slope[axis] = static_cast<int>(random.integer(-(1 << 22), 1 << 22));
-        }
-        maps.push_back(map);
-        const int end = std::min(32, begin + static_cast<int>(random.integer(1, 20)));
-        runs.push_back({begin, end, nullptr});
-        begin = end + static_cast<int>(random.integer(0, 3));
-      }
-      for (const CoarseMap& map : maps) of_tile.emplace_back(map, first);
-      for (std::size_t i = 0; i < runs.size(); ++i) runs[i].map = &of_tile[i];
-      const auto y = static_cast<int>(random.integer(0, 31)), z = static_cast<int>(random.integer(0, 31));
-      std::int32_t row[3][kMostInRow];
-      fill_fixed_row(runs.data(), static_cast<int>(runs.size()), y, z, row);
-      for (std::size_t i = 0; i < runs.size(); ++i) {
-        for (int x = runs[i].begin; x < runs[i].end; ++x) {
-          const glm::i64vec3 u = maps[i].u(first + glm::ivec3(x, y, z));
-          for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(row[axis][x], u[axis]) << hwy::TargetName(target);
-        }
+      const CoarseMap map = random_map(random, first);
+      const auto count = static_cast<int>(random.integer(1, kMostTogether));
+      std::uint16_t numbers[kRoomTogether];
+      for (std::uint16_t& number : numbers) number = static_cast<std::uint16_t>(random.integer(0, 32767));
+      std::int32_t u[3][kRoomTogether];
+      fill_fixed_list(TileMap(map, first), numbers, count, {u[0], u[1], u[2]});
+      for (int i = 0; i < count; ++i) {
+        const glm::i64vec3 expected = map.u(first + VoxelList::in_tile(numbers[i]));
+        for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(u[axis][i], expected[axis]) << hwy::TargetName(target);
       }
     }
   }

@@ -223,11 +223,11 @@ HWY_INLINE hn::Mask<Floats> smaller_label(Float a, Float b) {
 template <class Value>
 HWY_INLINE Value voted(Corners<Value> at, const Fractions& t) {
   const Floats df;
-  at.leave_out_weightless(t);
   const Value* label = at.value;
   auto uniform = same_label(label[0], label[1]);
   for (int c = 2; c < 8; ++c) uniform = hn::And(uniform, same_label(label[0], label[c]));
   if (hn::AllTrue(df, uniform)) return label[0];
+  at.leave_out_weightless(t);
   const Float one = hn::Set(df, 1.0f);
   const Float along_x[2] = {hn::Sub(one, t.x), t.x}, along_y[2] = {hn::Sub(one, t.y), t.y},
               along_z[2] = {hn::Sub(one, t.z), t.z};
@@ -253,7 +253,7 @@ struct Samples {
 
   /// For each voxel, a sample and the next one along i: at its own place, in the next row, in the next slice, and in
   /// both.
-  HWY_ALIGN typename Pair<V>::Bits pairs[4][kMostInRow];
+  HWY_ALIGN typename Pair<V>::Bits pairs[4][kRoomTogether];
 
   /// Loads sample after sample: cheaper than gathers, which some processors make of many steps, and no vector waits for
   /// it.
@@ -261,8 +261,12 @@ struct Samples {
     const std::int64_t row = source.layout.row, slice = source.layout.slice, steps[4] = {0, row, slice, slice + row};
     const V* voxels = static_cast<const V*>(source.voxels);
     const int count = places.count;
-    for (int i = 0; i < count; i += kVoxelsInLine) prefetch(voxels + places.at[i] + 2 * slice);
-    prefetch(voxels + places.at[count - 1] + 2 * slice);
+    if (places.in_a_row) {
+      for (int i = 0; i < count; i += kVoxelsInLine) prefetch(voxels + places.at[i] + 2 * slice);
+      prefetch(voxels + places.at[count - 1] + 2 * slice);
+    } else {
+      for (int i = 0; i < count; i += 4) prefetch(voxels + places.at[i] + 2 * slice);
+    }
     for (int i = 0; i < count; ++i) {
       const V* from = voxels + places.at[i];
       for (int n = 0; n < 4; ++n) {
@@ -296,10 +300,45 @@ struct Axes {
   Axis x, y, z;
 };
 
-/// Computes the places of the voxels in whole vectors.
-/// @param axes_at  `axes_at(i, x, y, z)` makes the axes of a vector of voxels at x, y, z, the i-th of the row and on
-template <class AxesAt>
-HWY_INLINE void find_with(const LinearLayout& layout, const Row& row, LinearPlaces& places, AxesAt&& axes_at) {
+/// A vector of output voxels.
+struct Voxels {
+  Int x, y, z;
+  hn::Mask<Ints> mapped;
+};
+
+HWY_INLINE Voxels voxels_at(const Row& row, int i) {
+  const Ints di;
+  const hn::Rebind<std::uint8_t, Ints> d8;
+  const glm::ivec3 first(row.voxel);
+  return {hn::Iota(di, first.x + i), hn::Set(di, first.y), hn::Set(di, first.z),
+          hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + i)), hn::Zero(di))};
+}
+/// The same counted from the first voxel of the tile.
+HWY_INLINE Voxels in_tile_at(const VoxelList& list, int i) {
+  constexpr int kBits = VoxelList::kAxisBits;
+  const Ints di;
+  const Int number = hn::PromoteTo(di, hn::LoadU(hn::Rebind<std::uint16_t, Ints>(), list.numbers + i)),
+            most = hn::Set(di, kTile - 1);
+  return {hn::And(number, most), hn::And(hn::ShiftRight<kBits>(number), most), hn::ShiftRight<2 * kBits>(number),
+          hn::FirstN(di, static_cast<std::size_t>(list.count - i))};
+}
+HWY_INLINE Voxels voxels_at(const VoxelList& list, int i) {
+  const Ints di;
+  const glm::ivec3 first(list.first);
+  const Voxels in = in_tile_at(list, i);
+  return {hn::Add(hn::Set(di, first.x), in.x), hn::Add(hn::Set(di, first.y), in.y), hn::Add(hn::Set(di, first.z), in.z),
+          in.mapped};
+}
+
+/// How many voxels vectors take: of a row, whole vectors only, for others share memory with what lies behind it.
+HWY_INLINE int count_in_vectors(const Row& row, int lanes) { return row.count / lanes * lanes; }
+HWY_INLINE int count_in_vectors(const VoxelList& list, int lanes) { return (list.count + lanes - 1) / lanes * lanes; }
+
+/// Computes the places of voxels in whole vectors.
+/// @param axes_at  `axes_at(i, voxels)` makes the axes of a vector of voxels, the i-th and on
+template <class OutputVoxels, class AxesAt>
+HWY_INLINE void find_with(const LinearLayout& layout, const OutputVoxels& output, LinearPlaces& places,
+                          AxesAt&& axes_at) {
   const Floats df;
   const Ints di;
   const hn::Rebind<std::uint8_t, Floats> d8;
@@ -308,57 +347,69 @@ HWY_INLINE void find_with(const LinearLayout& layout, const Row& row, LinearPlac
   // Offset of the buffer's first voxel. Numbers may wrap around, for their differences fit.
   const auto begin = static_cast<std::int32_t>(std::int64_t{layout.begin.z} * layout.slice +
                                                std::int64_t{layout.begin.y} * layout.row + layout.begin.x);
-  const glm::ivec3 first(row.voxel);
-  const Int along = hn::Iota(di, 0);
   Int least = hn::Set(di, INT32_MAX), most = hn::Set(di, INT32_MIN);
   std::size_t sampled = 0;
-  int count = 0;
-  for (; count + lanes <= row.count; count += lanes) {
-    const auto [x, y, z] =
-        axes_at(count, hn::Add(along, hn::Set(di, first.x + count)), hn::Set(di, first.y), hn::Set(di, first.z));
+  const int count = count_in_vectors(output, lanes);
+  for (int i = 0; i < count; i += lanes) {
+    const Voxels voxels = voxels_at(output, i);
+    const auto [x, y, z] = axes_at(i, voxels);
     const Int at = hn::Sub(hn::Add(hn::Add(hn::Mul(z.base, stride_slice), hn::Mul(y.base, stride_row)), x.base),
                            hn::Set(di, begin));
-    const auto mapped = hn::Gt(hn::PromoteTo(di, hn::LoadU(d8, row.mapped + count)), hn::Zero(di));
-    const auto good = hn::And(hn::And(mapped, x.inside), hn::And(y.inside, z.inside));
-    hn::Store(hn::IfThenElseZero(good, at), di, places.at + count);
-    hn::Store(x.fraction, df, places.x + count);
-    hn::Store(y.fraction, df, places.y + count);
-    hn::Store(z.fraction, df, places.z + count);
+    const auto good = hn::And(hn::And(voxels.mapped, x.inside), hn::And(y.inside, z.inside));
+    hn::Store(hn::IfThenElseZero(good, at), di, places.at + i);
+    hn::Store(x.fraction, df, places.x + i);
+    hn::Store(y.fraction, df, places.y + i);
+    hn::Store(z.fraction, df, places.z + i);
+    hn::Store(z.base, di, places.slice + i);
     hn::StoreU(hn::DemoteTo(d8, hn::IfThenElse(good, hn::Set(di, 1), hn::Set(di, 2))), d8,
-               reinterpret_cast<std::uint8_t*>(places.state) + count);
+               reinterpret_cast<std::uint8_t*>(places.state) + i);
     sampled += hn::CountTrue(di, good);
     const auto between = hn::RebindMask(di, hn::Ne(z.fraction, hn::Zero(df)));
     const Int top = hn::Add(z.base, hn::IfThenElseZero(between, hn::Set(di, 1)));
     least = hn::Min(least, hn::IfThenElse(good, z.base, hn::Set(di, INT32_MAX)));
     most = hn::Max(most, hn::IfThenElse(good, top, hn::Set(di, INT32_MIN)));
   }
-  std::fill(places.state + count, places.state + row.count, RowState::left);
+  for (int i = count; i < output.count; ++i) places.state[i] = RowState::left;
   places.count = count;
   places.sampled = static_cast<int>(sampled);
   if (sampled == 0) return;
   places.slices = {hn::GetLane(hn::MinOfLanes(di, least)), hn::GetLane(hn::MaxOfLanes(di, most))};
 }
 
-void find_places(const LinearLayout& layout, const Row& row, LinearPlaces& places) {
-  places.fused = row.fixed != nullptr;
+template <class OutputVoxels>
+HWY_INLINE void find_places(const LinearLayout& layout, const OutputVoxels& output, LinearPlaces& places) {
+  places.fused = output.fixed != nullptr;
   const glm::ivec3& last = layout.last;
-  if (!row.fixed) {
-    find_with(layout, row, places, [&](int i, Int x, Int y, Int z) {
+  if (!output.fixed) {
+    find_with(layout, output, places, [&](int i, const Voxels& voxels) {
       Float ux, uy, uz;
-      hn::LoadInterleaved3(Floats(), &row.offset[i].x, ux, uy, uz);
-      return Axes{Axis(ux, x, last.x), Axis(uy, y, last.y), Axis(uz, z, last.z)};
+      hn::LoadInterleaved3(Floats(), &output.offset[i].x, ux, uy, uz);
+      return Axes{Axis(ux, voxels.x, last.x), Axis(uy, voxels.y, last.y), Axis(uz, voxels.z, last.z)};
     });
-  } else if (!row.fixed->is_wide()) {
-    const auto& u = row.fixed->u;
-    find_with(layout, row, places, [&](int i, Int x, Int y, Int z) {
+  } else if (!output.fixed->is_wide()) {
+    const auto& u = output.fixed->u;
+    find_with(layout, output, places, [&](int i, const Voxels& voxels) {
       const Ints di;
-      return Axes{Axis(hn::LoadU(di, u[0] + i), x, last.x), Axis(hn::LoadU(di, u[1] + i), y, last.y),
-                  Axis(hn::LoadU(di, u[2] + i), z, last.z)};
+      return Axes{Axis(hn::LoadU(di, u[0] + i), voxels.x, last.x), Axis(hn::LoadU(di, u[1] + i), voxels.y, last.y),
+                  Axis(hn::LoadU(di, u[2] + i), voxels.z, last.z)};
     });
   } else {  // further than 32 bits reach
-    std::fill_n(places.state, row.count, RowState::left);
+    std::fill(places.state, places.state + output.count, RowState::left);
     places.count = places.sampled = 0;
   }
+}
+
+void find_of_row(const LinearLayout& layout, const Row& row, LinearPlaces& places) { find_places(layout, row, places); }
+void steps_of_list(const VoxelList& list, std::int32_t row, std::int32_t slice, std::int32_t (&to)[kRoomTogether]) {
+  const Ints di;
+  for (int i = 0; i < list.count; i += static_cast<int>(hn::Lanes(di))) {
+    const Voxels in = in_tile_at(list, i);
+    const Int along_j = hn::Mul(in.y, hn::Set(di, row)), along_k = hn::Mul(in.z, hn::Set(di, slice));
+    hn::StoreU(hn::Add(in.x, hn::Add(along_j, along_k)), di, to + i);
+  }
+}
+void find_of_list(const LinearLayout& layout, const VoxelList& list, LinearPlaces& places) {
+  find_places(layout, list, places);
 }
 
 /// Calls `work` with the voxels' type.
@@ -384,6 +435,19 @@ void sample_linear(const LinearSource& source, const LinearPlaces& places, void*
   });
 }
 
+void nearest_of(const LinearLayout& layout, const LinearPlaces& places, std::int32_t (&at)[kRoomTogether]) {
+  const Ints di;
+  const auto lanes = static_cast<int>(hn::Lanes(di));
+  for (int i = 0; i < places.count; i += lanes) {
+    const auto step = [&](const float* fraction, std::int32_t to_next) {
+      const auto is_next = hn::Ge(hn::Load(Floats(), fraction + i), hn::Set(Floats(), 0.5f));
+      return hn::IfThenElseZero(hn::RebindMask(di, is_next), hn::Set(di, to_next));
+    };
+    const Int steps = hn::Add(hn::Add(step(places.x, 1), step(places.y, layout.row)), step(places.z, layout.slice));
+    hn::StoreU(hn::Add(hn::Load(di, places.at + i), steps), di, at + i);
+  }
+}
+
 void sample_votes(const LinearSource& source, const LinearPlaces& places, void* output) {
   with_type(source.type, output, [&](auto* to) {
     using V = std::remove_pointer_t<decltype(to)>;
@@ -399,16 +463,35 @@ HWY_AFTER_NAMESPACE();
 
 namespace tetwarp::cpu {
 
-HWY_EXPORT(find_places);
+HWY_EXPORT(find_of_row);
+HWY_EXPORT(find_of_list);
+HWY_EXPORT(steps_of_list);
 HWY_EXPORT(sample_linear);
 HWY_EXPORT(sample_votes);
+HWY_EXPORT(nearest_of);
+
+bool LinearPlaces::begins(const LinearLayout& layout) {
+  if (found_ && layout == layout_) return false;
+  slices = {};
+  layout_ = layout;
+  return found_ = true;
+}
 
 void LinearPlaces::find(const LinearLayout& layout, const Row& row) {
-  if (found_ && layout == layout_) return;
-  slices = {};
-  HWY_DYNAMIC_DISPATCH(find_places)(layout, row, *this);
-  layout_ = layout;
-  found_ = true;
+  if (begins(layout)) HWY_DYNAMIC_DISPATCH(find_of_row)(layout, row, *this);
+}
+
+void LinearPlaces::find(const LinearLayout& layout, const VoxelList& list) {
+  in_a_row = false;
+  if (begins(layout)) HWY_DYNAMIC_DISPATCH(find_of_list)(layout, list, *this);
+}
+
+void find_steps(const VoxelList& list, std::int32_t row, std::int32_t slice, std::int32_t (&to)[kRoomTogether]) {
+  HWY_DYNAMIC_DISPATCH(steps_of_list)(list, row, slice, to);
+}
+
+void find_nearest(const LinearLayout& layout, const LinearPlaces& places, std::int32_t (&at)[kRoomTogether]) {
+  HWY_DYNAMIC_DISPATCH(nearest_of)(layout, places, at);
 }
 
 void sample_linear_row(const LinearSource& source, const LinearPlaces& places, void* output) {

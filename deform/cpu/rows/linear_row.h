@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "deform/core/sample_voxel.h"
@@ -47,33 +48,43 @@ struct LinearSource {
   }
 };
 
-/// What was done with a voxel of a row.
+/// What was done with a voxel.
 enum class RowState : std::uint8_t {
   sampled = 1,  ///< its value is written
   left = 2      ///< `sample_voxel` has to compute it
 };
 
-/// Where the voxels of a row come from, for all sources with one layout. Only places well inside the source are
-/// computed; other voxels are left.
+/// Where the voxels of a row or a list come from, for all sources with one layout. Only places well inside the source
+/// are computed; other voxels are left.
 struct LinearPlaces {
-  alignas(64) float x[kMostInRow], y[kMostInRow], z[kMostInRow];  ///< fractions
-  alignas(64) std::int32_t at[kMostInRow];                        ///< voxel of the buffer; 0 where it is left
-  RowState state[kMostInRow];
-  bool fused = false;  ///< whether the field is coarse: then interpolations are fused (`Lerp`)
-  int count = 0;       ///< number of voxels in whole vectors; the voxels after them are left
-  int sampled = 0;     ///< number of voxels that are not left
-  SliceRange slices;   ///< slices of the sources that have weight
+  alignas(64) float x[kRoomTogether], y[kRoomTogether], z[kRoomTogether];  ///< fractions
+  alignas(64) std::int32_t at[kRoomTogether];                              ///< voxel of the buffer; 0 where it is left
+  alignas(64) std::int32_t slice[kRoomTogether];  ///< slice of the source below the place, where it is not left
+  RowState state[kRoomTogether];
+  bool fused = false;    ///< whether the field is coarse: then interpolations are fused (`Lerp`)
+  bool in_a_row = true;  ///< whether the voxels are a row
+  int count = 0;         ///< number of voxels in whole vectors; the voxels after them are left
+  int sampled = 0;       ///< number of voxels that are not left
+  SliceRange slices;     ///< of a row: slices of the sources that have weight where interpolation is linear
 
-  /// Computes the places, once for a row.
-  /// @param row  up to kMostInRow voxels, the same in all calls
-  void find(const LinearLayout& layout, const Row& row);
+  /// Computes the places, once for a row or a list.
+  /// @param voxels  up to kMostTogether, the same in all calls
+  void find(const LinearLayout& layout, const Row& voxels);
+  void find(const LinearLayout& layout, const VoxelList& voxels);
 
  private:
+  bool begins(const LinearLayout& layout);
+
   LinearLayout layout_;
   bool found_ = false;
 };
 
-/// Samples the voxels of a row that are not left, with the widest vectors that the processor has (Highway). The result
+/// How far each voxel of a list lies from the first of its tile in a volume, with the widest vectors that the processor
+/// has (Highway). @param row, slice  from one row and slice of the volume to the next  @param to  up to 64 are written
+/// behind the last
+void find_steps(const VoxelList& list, std::int32_t row, std::int32_t slice, std::int32_t (&to)[kRoomTogether]);
+
+/// Samples the voxels that are not left, with the widest vectors that the processor has (Highway). The result
 /// has the bits of `sample_voxel` with linear interpolation.
 ///
 /// @param places  computed for the layout of the source
@@ -82,5 +93,25 @@ void sample_linear_row(const LinearSource& source, const LinearPlaces& places, v
 
 /// The same with Interpolation::vote.
 void sample_vote_row(const LinearSource& source, const LinearPlaces& places, void* output);
+
+/// The voxels of the buffer that are nearest to places that are not left, with the widest vectors that the processor
+/// has (Highway); for others, some voxel. Some place must not be left.
+void find_nearest(const LinearLayout& layout, const LinearPlaces& places, std::int32_t (&at)[kRoomTogether]);
+
+/// Samples with Interpolation::nearest, for any type. @param voxels  of the buffer
+template <class V>
+void sample_nearest_row(const LinearLayout& layout, const V* voxels, const LinearPlaces& places, V* output) {
+  if (places.sampled == 0) return;  // there may be no voxel at all that can be read
+  std::int32_t at[kRoomTogether];
+  find_nearest(layout, places, at);
+  for (int i = 0; i < places.count; ++i) {
+    const V value = voxels[at[i]];
+    output[i] = value;
+    if constexpr (std::is_floating_point_v<V>) {  // all that is no number, and no copy, is one and the same NaN
+      const bool is_copy = places.x[i] == 0 && places.y[i] == 0 && places.z[i] == 0;
+      if (value != value && !is_copy) output[i] = std::numeric_limits<V>::quiet_NaN();
+    }
+  }
+}
 
 }  // namespace tetwarp::cpu

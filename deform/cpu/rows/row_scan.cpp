@@ -4,7 +4,6 @@
 #include "deform/cpu/rows/row_scan.h"
 
 #include <bit>
-#include <cstring>
 
 // Highway compiles this file once for each instruction set.
 #undef HWY_TARGET_INCLUDE
@@ -24,8 +23,6 @@ using Ints = hn::RebindToSigned<Floats>;
 using Float = hn::Vec<Floats>;
 using Int = hn::Vec<Ints>;
 
-constexpr int kLanes = 16;  ///< of the widest vectors
-
 /// Where some faces cross rows: the least and the most that float leaves open, `RowsAlongZ` for a vector of rows.
 struct Crossing {
   Float low, high;
@@ -40,27 +37,35 @@ struct Crossing {
   }
 };
 
-/// The first voxel that does not lie before a crossing, from 0 to `width`. Whatever is far away is clamped first.
-HWY_INLINE Int first_from(Float crossing, Float width) {
-  const Float clamped = hn::Min(hn::Max(crossing, hn::Zero(Floats())), width);
-  return hn::ConvertTo(Ints(), hn::Ceil(clamped));
+/// The first voxel that does not lie before a crossing, from 0 to `width`.
+HWY_INLINE Float first_from(Float crossing, Float width) {
+  return hn::Ceil(hn::Min(hn::Max(crossing, hn::Zero(Floats())), width));
 }
 
-/// The lowest n bits, n from 0 to 32.
-HWY_INLINE Int lowest(Int n) {
+/// Whole numbers from 0 to 2^22: with 2^23 added, their bits are the lowest of a float.
+HWY_INLINE Int in_int(Float whole) {
   const Ints di;
-  const Int all = hn::Set(di, -1), some = hn::Sub(hn::Shl(hn::Set(di, 1), hn::And(n, hn::Set(di, 31))), hn::Set(di, 1));
-  return hn::IfThenElse(hn::Gt(n, hn::Set(di, 31)), all, some);
+  return hn::And(hn::BitCast(di, hn::Add(whole, hn::Set(Floats(), 0x1p23f))), hn::Set(di, (1 << 23) - 1));
 }
 
-/// Calls `visit(lane)` for the lanes of a mask.
-template <class Mask, class Visit>
-HWY_INLINE void for_each_lane(Mask mask, Visit&& visit) {
-  std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(Ints(), mask, bytes);
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, bytes, sizeof bits);
-  for (; bits != 0; bits &= bits - 1) visit(std::countr_zero(bits));
+/// A bit for each voxel from `begin` to before `end`, both from 0 to 32. Any bits where there is none.
+HWY_INLINE Int bits_between(Int begin, Int end) {
+  const Ints di;
+  const hn::RebindToUnsigned<Ints> du;
+  const Int most = hn::Set(di, 31), none_left = hn::And(hn::Sub(begin, end), most);  // 32 minus their number
+  return hn::Shl(hn::BitCast(di, hn::Shr(hn::Set(du, ~0u), hn::BitCast(du, none_left))), hn::And(begin, most));
+}
+
+/// Appends the lanes of a mask. @return how many
+template <class D, class T = hn::TFromD<D>>
+HWY_INLINE int append(Int lanes, hn::Mask<Ints> mask, D d, T* to) {
+  const Int first = hn::Compress(lanes, mask);
+  if constexpr (sizeof(T) == sizeof(std::int32_t)) {
+    hn::StoreU(hn::BitCast(d, first), d, to);
+  } else {
+    hn::StoreU(hn::DemoteTo(d, first), d, to);
+  }
+  return static_cast<int>(hn::CountTrue(Ints(), mask));
 }
 
 /// The rows of a vector. @param wanted  lanes that count
@@ -78,20 +83,17 @@ HWY_INLINE void scan_vector(const RowFaces& t, Float y, Float z, Float width, hn
   };
   t.lower > 1 ? enters(second) : leaves(second);
   t.lower > 2 ? enters(third) : leaves(third);
-  const Int begin = first_from(begin_low, width), end = first_from(end_high, width);
-  const auto any = hn::And(wanted, hn::Lt(begin, end));
+  const Float begin = first_from(begin_low, width), end = first_from(end_high, width);
+  const auto any = hn::And(wanted, hn::RebindMask(di, hn::Lt(begin, end)));
   if (hn::AllFalse(di, any)) return;
-  const Int late_begin = first_from(begin_high, width), early_end = first_from(end_low, width);
-  const auto sure = hn::And(hn::Eq(begin, late_begin), hn::Eq(early_end, end));
-  HWY_ALIGN std::int32_t bits[kLanes], rows[kLanes];
-  hn::Store(hn::AndNot(lowest(begin), lowest(end)), di, bits);
-  hn::Store(hn::ConvertTo(di, hn::MulAdd(z, hn::Set(Floats(), float{kMostRowTile}), y)), di, rows);
-  for_each_lane(hn::And(any, sure), [&](int lane) {
-    out.found_rows[out.found] = static_cast<std::uint16_t>(rows[lane]);
-    out.found_bits[out.found++] = static_cast<std::uint32_t>(bits[lane]);
-  });
-  for_each_lane(hn::AndNot(sure, any),
-                [&](int lane) { out.unsure_rows[out.unsure++] = static_cast<std::uint16_t>(rows[lane]); });
+  const Float late_begin = first_from(begin_high, width), early_end = first_from(end_low, width);
+  const auto sure = hn::RebindMask(di, hn::And(hn::Eq(begin, late_begin), hn::Eq(early_end, end)));
+  const Int rows = in_int(hn::MulAdd(z, hn::Set(Floats(), float{kMostRowTile}), y));
+  const hn::Rebind<std::uint16_t, Ints> d16;
+  const auto found = hn::And(any, sure), unsure = hn::AndNot(sure, any);
+  append(bits_between(in_int(begin), in_int(end)), found, hn::RebindToUnsigned<Ints>(), out.found_bits + out.found);
+  out.found += append(rows, found, d16, out.found_rows + out.found);
+  if (!hn::AllFalse(di, unsure)) out.unsure += append(rows, unsure, d16, out.unsure_rows + out.unsure);
 }
 
 void scan(const RowFaces& faces, int y_begin, int y_end, int z_begin, int z_end, int width, RowScan& out) {
@@ -121,6 +123,26 @@ void scan(const RowFaces& faces, int y_begin, int y_end, int z_begin, int z_end,
   }
 }
 
+int list(const std::uint16_t* rows, const std::uint32_t* bits, int count, std::uint16_t* numbers, int& listed,
+         int room) {
+  const hn::CappedTag<std::uint16_t, 16> d16;
+  const auto lanes = static_cast<int>(hn::Lanes(d16));
+  const auto along = hn::Iota(d16, 0);
+  int at = listed, n = 0;
+  for (; n < count && at <= room - kMostRowTile; ++n) {
+    for (std::uint32_t left = bits[n]; left != 0;) {
+      const int begin = std::countr_zero(left), length = std::countr_one(left >> begin);
+      const auto first = static_cast<std::uint16_t>(rows[n] * kMostRowTile + begin);
+      for (int i = 0; i < length; i += lanes)
+        hn::StoreU(hn::Add(along, hn::Set(d16, static_cast<std::uint16_t>(first + i))), d16, numbers + at + i);
+      at += length;
+      left = begin + length == 32 ? 0 : left & ~0u << (begin + length);
+    }
+  }
+  listed = at;
+  return n;
+}
+
 }  // namespace tetwarp::cpu::HWY_NAMESPACE
 
 HWY_AFTER_NAMESPACE();
@@ -130,9 +152,15 @@ HWY_AFTER_NAMESPACE();
 namespace tetwarp::cpu {
 
 HWY_EXPORT(scan);
+HWY_EXPORT(list);
 
 void scan_rows(const RowFaces& faces, int y_begin, int y_end, int z_begin, int z_end, int width, RowScan& scan_of) {
   HWY_DYNAMIC_DISPATCH(scan)(faces, y_begin, y_end, z_begin, z_end, width, scan_of);
+}
+
+int list_voxels(const std::uint16_t* rows, const std::uint32_t* bits, int count, std::uint16_t* numbers, int& listed,
+                int room) {
+  return HWY_DYNAMIC_DISPATCH(list)(rows, bits, count, numbers, listed, room);
 }
 
 }  // namespace tetwarp::cpu

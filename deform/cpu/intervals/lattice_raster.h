@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "deform/cpu/interval_tile.h"
+#include "deform/cpu/intervals/interval_tile.h"
 #include "deform/cpu/lattice_index.h"
 
 namespace tetwarp::cpu {
@@ -16,7 +16,8 @@ class LatticeRaster {
  public:
   /// Finds the owners in a part of the output of up to kTile voxels on an axis.
   /// @param counts  whether voxels are to be counted out among several owners
-  void find(const LatticeIndex& lattice, const Region& box, bool counts, IntervalTile& tile);
+  /// @param sink    gets what tetrahedra own, unless null
+  void find(const LatticeIndex& lattice, const Region& box, bool counts, IntervalTile& tile, IntervalSink* sink);
 
  private:
   struct Numbered {

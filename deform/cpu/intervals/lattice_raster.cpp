@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/cpu/lattice_raster.h"
+#include "deform/cpu/intervals/lattice_raster.h"
 
 #include <algorithm>
 
@@ -34,15 +34,16 @@ void LatticeRaster::for_each(const LatticeIndex& lattice, const Region& box, con
   });
 }
 
-void LatticeRaster::find(const LatticeIndex& lattice, const Region& box, bool counts, IntervalTile& tile) {
+void LatticeRaster::find(const LatticeIndex& lattice, const Region& box, bool counts, IntervalTile& tile,
+                         IntervalSink* sink) {
   const Nudge& nudge = lattice.frame().nudge;
-  bool shared = false;
-  tile.begin(box, nudge, counts);
+  tile.begin(box, nudge, counts, sink);
   for_each(lattice, box, tile, [&](std::uint64_t number, const Tetrahedron& t) {
-    shared = tile.enter(number, t) || shared;
-    return !shared;
+    tile.enter(number, t);
+    return !tile.is_shared();
   });
-  if (!shared) return;
+  tile.end();
+  if (!tile.is_shared()) return;
   // Some voxel has several owners, and the lowest number is to win: once more, in the order of the numbers.
   listed_.clear();
   for_each(lattice, box, tile, [&](std::uint64_t number, const Tetrahedron& t) {
@@ -50,8 +51,9 @@ void LatticeRaster::find(const LatticeIndex& lattice, const Region& box, bool co
     return true;
   });
   std::sort(listed_.begin(), listed_.end(), [](const Numbered& a, const Numbered& b) { return a.number < b.number; });
-  tile.begin(box, nudge, counts);
+  tile.begin(box, nudge, counts, sink);
   for (const Numbered& of : listed_) tile.enter(of.number, of.tetrahedron);
+  tile.end();
 }
 
 }  // namespace tetwarp::cpu

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "deform/cell_lists.h"
-#include "deform/cpu/interval_tile.h"
+#include "deform/cpu/intervals/interval_tile.h"
 #include "deform/snapped_mesh.h"
 
 namespace tetwarp::cpu {
@@ -22,7 +22,8 @@ class MeshRaster {
 
   /// Finds the owners in a part of the output of up to kTile voxels on an axis.
   /// @param counts  whether voxels are to be counted out among several owners
-  void find(const Region& box, bool counts, IntervalTile& tile) const;
+  /// @param sink    gets what tetrahedra own, unless null
+  void find(const Region& box, bool counts, IntervalTile& tile, IntervalSink* sink) const;
 
  private:
   Region bin(const glm::i64vec3& at) const;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/cpu/mesh_raster.h"
+#include "deform/cpu/intervals/mesh_raster.h"
 
 #include <algorithm>
 #include <glm/common.hpp>
@@ -54,13 +54,14 @@ void MeshRaster::build(const SnappedMesh& mesh, const Geometry& output, const Co
   lists_.build(static_cast<std::size_t>(bins_.x * bins_.y * bins_.z), for_each_pair);
 }
 
-void MeshRaster::find(const Region& box, bool counts, IntervalTile& tile) const {
-  tile.begin(box, mesh_->nudge, counts);
+void MeshRaster::find(const Region& box, bool counts, IntervalTile& tile, IntervalSink* sink) const {
+  tile.begin(box, mesh_->nudge, counts, sink);
   const glm::i64vec3 begin = box.begin / kBin, end = (box.end - std::int64_t{1}) / kBin;
   if (begin == end) {
     const std::size_t number = bin_number(begin);
     for (const std::uint32_t* n = lists_.begin(number); n != lists_.end(number); ++n)
       tile.enter(*n, mesh_->tetrahedron(*n));
+    tile.end();
     return;
   }
   std::vector<std::uint32_t> listed;  // of several bins: numbers must rise
@@ -73,6 +74,7 @@ void MeshRaster::find(const Region& box, bool counts, IntervalTile& tile) const 
   std::sort(listed.begin(), listed.end());
   listed.erase(std::unique(listed.begin(), listed.end()), listed.end());
   for (const std::uint32_t n : listed) tile.enter(n, mesh_->tetrahedron(n));
+  tile.end();
 }
 
 }  // namespace tetwarp::cpu
