@@ -80,15 +80,19 @@ struct Axis {
 
   /// @param u  of a coarse field, 2^-23 voxel
   HWY_INLINE Axis(Int u, Int voxel, std::int32_t last) {
+    static_assert(kFixedBits == 23);
+    // Its 23 bits, behind a leading one, are a float from 1 to 2: exact, and so is the difference.
+    const Float one = hn::Set(Floats(), 1.0f);
     const Int rest = hn::And(u, hn::Set(Ints(), static_cast<std::int32_t>(kFixedOne - 1)));
-    fraction = hn::Mul(hn::ConvertTo(Floats(), rest), hn::Set(Floats(), 0x1p-23f));
+    fraction = hn::Sub(hn::BitCast(Floats(), hn::Or(rest, hn::BitCast(Ints(), one))), one);
     base = hn::Add(voxel, hn::ShiftRight<kFixedBits>(u));
     inside = is_between(last);
   }
 
  private:
   HWY_INLINE hn::Mask<Ints> is_between(std::int32_t last) const {
-    return hn::And(hn::Gt(base, hn::Set(Ints(), -1)), hn::Lt(base, hn::Set(Ints(), last)));
+    const hn::RebindToUnsigned<Ints> du;  // what is negative is larger than any
+    return hn::RebindMask(Ints(), hn::Lt(hn::BitCast(du, base), hn::Set(du, static_cast<std::uint32_t>(last))));
   }
 };
 
@@ -181,6 +185,12 @@ struct Corners {
   }
 };
 
+/// The nearest whole number, an even one between two, of values below 2^22: floats from 2^23 to 2^24 are whole numbers.
+HWY_INLINE Int nearest_whole(Float value) {
+  const Float lift = hn::Set(Floats(), 0x1.8p23f);
+  return hn::Sub(hn::BitCast(Ints(), hn::Add(value, lift)), hn::BitCast(Ints(), lift));
+}
+
 /// The sample of whole numbers, to the nearest one. A corner without weight changes nothing.
 template <Lerp kLerp>
 HWY_INLINE Int interpolated(const Corners<Int>& at, const Fractions& t) {
@@ -188,7 +198,7 @@ HWY_INLINE Int interpolated(const Corners<Int>& at, const Fractions& t) {
     return mix<kLerp>(hn::ConvertTo(Floats(), at.value[c]), hn::ConvertTo(Floats(), at.value[c + 1]), t.x);
   };
   const auto along_y = [&](int c) { return mix<kLerp>(along_x(c), along_x(c + 2), t.y); };
-  return hn::NearestInt(mix<kLerp>(along_y(0), along_y(4), t.z));
+  return nearest_whole(mix<kLerp>(along_y(0), along_y(4), t.z));
 }
 
 /// The sample of floats: a corner without weight does not count, even if it is infinite or no number; a copy is one to
@@ -330,6 +340,10 @@ HWY_INLINE Voxels voxels_at(const VoxelList& list, int i) {
           in.mapped};
 }
 
+/// Whether the slices of the source are wanted of all voxels together.
+constexpr bool has_slices(const Row&) { return true; }
+constexpr bool has_slices(const VoxelList&) { return false; }
+
 /// How many voxels vectors take: of a row, whole vectors only, for others share memory with what lies behind it.
 HWY_INLINE int count_in_vectors(const Row& row, int lanes) { return row.count / lanes * lanes; }
 HWY_INLINE int count_in_vectors(const VoxelList& list, int lanes) { return (list.count + lanes - 1) / lanes * lanes; }
@@ -364,6 +378,7 @@ HWY_INLINE void find_with(const LinearLayout& layout, const OutputVoxels& output
     hn::StoreU(hn::DemoteTo(d8, hn::IfThenElse(good, hn::Set(di, 1), hn::Set(di, 2))), d8,
                reinterpret_cast<std::uint8_t*>(places.state) + i);
     sampled += hn::CountTrue(di, good);
+    if (!has_slices(output)) continue;
     const auto between = hn::RebindMask(di, hn::Ne(z.fraction, hn::Zero(df)));
     const Int top = hn::Add(z.base, hn::IfThenElseZero(between, hn::Set(di, 1)));
     least = hn::Min(least, hn::IfThenElse(good, z.base, hn::Set(di, INT32_MAX)));
@@ -372,7 +387,7 @@ HWY_INLINE void find_with(const LinearLayout& layout, const OutputVoxels& output
   for (int i = count; i < output.count; ++i) places.state[i] = RowState::left;
   places.count = count;
   places.sampled = static_cast<int>(sampled);
-  if (sampled == 0) return;
+  if (sampled == 0 || !has_slices(output)) return;
   places.slices = {hn::GetLane(hn::MinOfLanes(di, least)), hn::GetLane(hn::MaxOfLanes(di, most))};
 }
 

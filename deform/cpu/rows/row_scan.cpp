@@ -37,11 +37,6 @@ struct Crossing {
   }
 };
 
-/// The first voxel that does not lie before a crossing, from 0 to `width`.
-HWY_INLINE Float first_from(Float crossing, Float width) {
-  return hn::Ceil(hn::Min(hn::Max(crossing, hn::Zero(Floats())), width));
-}
-
 /// Whole numbers from 0 to 2^22: with 2^23 added, their bits are the lowest of a float.
 HWY_INLINE Int in_int(Float whole) {
   const Ints di;
@@ -83,10 +78,13 @@ HWY_INLINE void scan_vector(const RowFaces& t, Float y, Float z, Float width, hn
   };
   t.lower > 1 ? enters(second) : leaves(second);
   t.lower > 2 ? enters(third) : leaves(third);
-  const Float begin = first_from(begin_low, width), end = first_from(end_high, width);
+  // The first voxels that do not lie before a crossing, those of the row as far as it matters: where `begin` lies
+  // behind the row, `end` does not, and where `end` lies before it, `begin` does not.
+  const Float zero = hn::Zero(Floats());
+  const Float begin = hn::Ceil(hn::Max(begin_low, zero)), end = hn::Ceil(hn::Min(end_high, width));
   const auto any = hn::And(wanted, hn::RebindMask(di, hn::Lt(begin, end)));
   if (hn::AllFalse(di, any)) return;
-  const Float late_begin = first_from(begin_high, width), early_end = first_from(end_low, width);
+  const Float late_begin = hn::Ceil(hn::Max(begin_high, zero)), early_end = hn::Ceil(hn::Min(end_low, width));
   const auto sure = hn::RebindMask(di, hn::And(hn::Eq(begin, late_begin), hn::Eq(early_end, end)));
   const Int rows = in_int(hn::MulAdd(z, hn::Set(Floats(), float{kMostRowTile}), y));
   const hn::Rebind<std::uint16_t, Ints> d16;
