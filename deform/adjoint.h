@@ -42,7 +42,8 @@ struct DisplacementGradient {
 /// every run. Each gradient has a unit of its own, that follows its largest term; that of the displacement has the
 /// terms of all targets. A term that is not finite makes its gradient NaN, and no other.
 ///
-/// What holds of memory and threads for a Resampler holds here; nothing is streamed. Beside a resampler it takes 4
+/// What holds of memory and threads for a Resampler holds here; nothing is streamed, so a device refuses copies beyond
+/// `Limits::memory`. Beside a resampler it takes 4
 /// bytes for each voxel of the output; from the first call on 8 for each value of a wanted source gradient, and for
 /// that of the displacement 12 for each voxel of the output and 24 for each vertex. A device keeps up to 12 bytes a
 /// voxel more of the tetrahedra of a coarse field, and copies of what lies on the host.
@@ -64,7 +65,7 @@ class ResampleAdjoint {
   /// @param displacement  where the gradient of the displacement goes
   /// @param control       stop and stream
   /// @throws InputError for views and lengths that do not fit, integer volumes, an interpolation that has no such
-  ///     gradient
+  ///     gradient; on a device, where copies of what lies on the host exceed `Limits::memory`
   /// @throws Cancelled
   virtual void apply(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement,
                      const Control& control = {}) = 0;

@@ -24,7 +24,8 @@ namespace itk {
  *
  * The input lies on the grid of the deformed image. The output's grid is that of the image that was deformed: of the
  * source image where it is set, else as `OutputGridFilter` says, by default that of the input. The output is made
- * whole. Pixels are float or double, or arrays of them.
+ * whole. Pixels are float or double, or arrays of them. Gradients are not streamed: where they do not fit into
+ * `SetDeviceMemory`, the update throws.
  *
  * \code
  * auto adjoint = itk::VertexFieldResampleAdjointImageFilter<itk::Image<float, 3>>::New();

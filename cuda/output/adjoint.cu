@@ -209,7 +209,10 @@ __global__ void finish_source_kernel(const std::int64_t* sums, std::int64_t coun
 class Adjoint final : public ResampleAdjoint {
  public:
   Adjoint(const Geometry& output, int device, const Limits& limits)
-      : ResampleAdjoint(output), device_(device), resampler_(make_cuda_resampler(output, device, limits)) {
+      : ResampleAdjoint(output),
+        device_(device),
+        memory_(limits.memory),
+        resampler_(make_cuda_resampler(output, device, limits)) {
     require(output.size.x < INT32_MAX / 32 && (output.size.y + kWarps - 1) / kWarps < 65536 &&
                 (output.size.z + kColumn - 1) / kColumn < 65536,
             "the output is too large for gradients on a device");
@@ -267,6 +270,7 @@ class Adjoint final : public ResampleAdjoint {
       require_memory(target.source_gradient.voxels, target.source_gradient.memory, "the gradient of a source");
     }
     require_memory(displacement.values.data(), displacement.memory, "the gradient of the displacement");
+    require_room(targets, displacement);
     if (control.stop.stop_requested()) throw Cancelled();
     if (targets.empty())
       clear(displacement);
@@ -281,6 +285,25 @@ class Adjoint final : public ResampleAdjoint {
   template <class T>
   VolumeView map_view(T* values, VoxelType type) const {
     return {&output(), whole(output()), type, 1, reinterpret_cast<std::byte*>(values), Memory::device};
+  }
+
+  /// Refuses what the limit of memory has no room for. @throws InputError
+  void require_room(std::span<const AdjointTarget> targets, const DisplacementGradient& displacement) const {
+    if (memory_ == 0) return;
+    std::uint64_t bytes = 0;
+    const auto add = [&bytes](const auto& view) {
+      if (!view.voxels || view.memory == Memory::device) return;
+      bytes += static_cast<std::uint64_t>(voxel_count(*view.geometry) * view.components) * size_bytes(view.type);
+    };
+    for (const AdjointTarget& target : targets) {
+      if (!displacement.values.empty()) add(target.source);
+      add(target.output_gradient);
+      add(target.source_gradient);
+    }
+    if (displacement.memory == Memory::host) bytes += displacement.values.size_bytes();
+    require(bytes <= memory_, "the gradients want " + std::to_string(bytes) +
+                                  " bytes of device memory for copies, and the limit is " + std::to_string(memory_) +
+                                  "; gradients are not streamed, so raise the limit or take the CPU");
   }
 
   void clear(const DisplacementGradient& gradient) const {
@@ -419,6 +442,7 @@ class Adjoint final : public ResampleAdjoint {
   }
 
   int device_;
+  std::uint64_t memory_;  ///< `Limits::memory`
   std::unique_ptr<ForwardResampler> resampler_;
   cudaStream_t stream_ = nullptr;  ///< of the call
   bool ready_ = false, coarse_ = false, has_table_ = false;

@@ -44,9 +44,11 @@ class BoundAdjoint {
                  const std::optional<MeshArrays>& mesh, const std::optional<ConstArray>& replaced,
                  const std::string& outside, const CallOptions& options) {
     const std::unique_lock lock = locked(mutex_);
+    is_set_ = false;  // until the field is taken: what it referred to is replaced
     const FieldView field = forward_.hold(lattice, displacement, mesh, replaced, outside);
     run_call(options, forward_.is_small() && voxel_count(output_) < kSmallCall,
              [&](const Control& control) { adjoint_->set_field(field, control); });
+    is_set_ = true;
   }
 
   /// @param displacement  takes dL/d(displacement), [n, 3] of float, or None
@@ -77,6 +79,7 @@ class BoundAdjoint {
                   memory_of(read, "the gradient of the displacement")};
     }
     const std::unique_lock lock = locked(mutex_);
+    require(is_set_, "apply needs a field: call set_field first");
     run_call(options, voxel_count(output_) < kSmallCall,
              [&](const Control& control) { adjoint_->apply(views, gradient, control); });
   }
@@ -85,6 +88,7 @@ class BoundAdjoint {
   Geometry output_;
   std::unique_ptr<ResampleAdjoint> adjoint_;
   ForwardArrays forward_;
+  bool is_set_ = false;
   std::timed_mutex mutex_;
 };
 

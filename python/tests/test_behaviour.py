@@ -49,6 +49,22 @@ def test_one_resampler_serves_several_threads(ct):
     assert set(results) == {expected}
 
 
+def test_what_fails_to_take_a_field_does_not_go_on_with_the_one_before():
+    # The binding behind tetwarp.torch; the arrays of the field before are gone by then.
+    grid = tw.Geometry((5, 4, 3))
+    options = tw._calls.options(False, "test", 0)
+    adjoint = tw._core.Adjoint("cpu", grid._grid, 0, 1)
+    made, given = np.zeros((3, 4, 5), np.float32), np.ones((3, 4, 5), np.float32)
+    target = tw._core.AdjointTarget(None, grid._grid, given, made, "linear")
+    adjoint.set_field(grid._grid, np.zeros((3, 4, 5, 3), np.float32), None, None, "refuse", options)
+    adjoint.apply([target], None, options)
+    assert (made == 1).all()
+    with pytest.raises(tw.InputError, match="displacement"):
+        adjoint.set_field(grid._grid, np.zeros((3, 4, 4, 3), np.float32), None, None, "refuse", options)
+    with pytest.raises(tw.InputError, match="set_field first"):
+        adjoint.apply([target], None, options)
+
+
 @pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
 def test_processes_give_the_same_bits(method):
     expected = [warp(seed) for seed in range(3)]  # the parent has threads of its own by then

@@ -634,5 +634,28 @@ TEST_P(Adjoints, RefusesWhatHasNoGradient) {
   expect_refusal(good, true, "215 vertices, and the field has 216");
 }
 
+/// Copies of three volumes of 216 floats, of which the source is not wanted for the volume's own gradient alone.
+TEST_P(Adjoints, RefuseCopiesBeyondTheLimitOfADevice) {
+  const Geometry grid = unit_grid({6, 6, 6});
+  const VertexField field = uniform_field(grid, glm::vec3(0));
+  Volume<float> source = poisoned<float>(grid), given{grid, std::vector<float>(216, 1.0f)}, gradient = source;
+  std::vector<glm::vec3> moved(216);
+  const AdjointTarget target{.source = view(source), .output_gradient = view(given), .source_gradient = view(gradient)};
+  const auto adjoint = GetParam().make_adjoint(grid, Limits{.memory = 4 * (3 * 216 + 3 * 216) - 1});
+  adjoint->set_field(view(field));
+  adjoint->apply({&target, 1}, {});
+  EXPECT_EQ(gradient.voxels[0], 1.0f);
+  if (GetParam().name == "cpu") {
+    EXPECT_NO_THROW(adjoint->apply({&target, 1}, {moved}));
+    return;
+  }
+  try {
+    adjoint->apply({&target, 1}, {moved});
+    ADD_FAILURE() << "expected a refusal";
+  } catch (const InputError& error) {
+    EXPECT_TRUE(says(error.what(), {"5184 bytes", "the limit is 5183", "not streamed"}));
+  }
+}
+
 }  // namespace
 }  // namespace tetwarp
