@@ -20,6 +20,10 @@ macro(tetwarp_enable_cuda)
     tetwarp_choose_cuda_architectures(CMAKE_CUDA_ARCHITECTURES tetwarp_cuda_reason
                                       "${CMAKE_CUDA_ARCHITECTURES_NATIVE}" "${tetwarp_cuda_supported}")
   endif()
+  # CMake 3.25 (Debian 12) sets a property of a target that it makes of this library, although CUDA 13 has no such library.
+  if(NOT TARGET CUDA::nvToolsExt)
+    add_library(CUDA::nvToolsExt INTERFACE IMPORTED)
+  endif()
   set(TETWARP_CUDA_COMPILED_FOR "${CMAKE_CUDA_ARCHITECTURES}" CACHE INTERNAL "CUDA architectures of this build")
   message(STATUS "Tetwarp: CUDA architectures ${CMAKE_CUDA_ARCHITECTURES} (${tetwarp_cuda_reason})")
 endmacro()
