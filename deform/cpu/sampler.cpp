@@ -69,10 +69,15 @@ class TypedSampler final : public TargetSampler {
     }
     places.find(source_.layout, list);
     V values[kRoomTogether];
-    std::int32_t steps[kRoomTogether];
     sample_places(places, values);
-    find_steps(list, static_cast<std::int32_t>(row), static_cast<std::int32_t>(slice), steps);
-    for (int i = 0; i < list.count; ++i) output[steps[i]] = values[i];
+    const int written = places.sampled == 0 ? 0 : list.count;  // those that vectors left are written below
+    if (slice <= INT32_MAX / kTile) {
+      std::int32_t steps[kRoomTogether];
+      find_steps(list, static_cast<std::int32_t>(row), static_cast<std::int32_t>(slice), steps);
+      for (int i = 0; i < written; ++i) output[steps[i]] = values[i];
+    } else {
+      for (int i = 0; i < written; ++i) *to(i) = values[i];
+    }
     if (slices) note_places(list, places, slices_of);
     sample_left(list, places, to, coverage, counts, slices_of);
   }
