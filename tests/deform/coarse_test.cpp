@@ -12,6 +12,7 @@
 #include "tests/support/backends.h"
 #include "tests/support/fields.h"
 #include "tests/support/meshes.h"
+#include "tests/support/shifted.h"
 
 namespace tetwarp {
 namespace {
@@ -126,6 +127,46 @@ TEST_P(CoarseFields, ThatArePressedFlatOrPulledApartHaveTheOraclesPlaces) {
           return moved;
         });
     expect_oracles_result(*make(output), field, Outside::background);
+  }
+}
+
+/// Where tetrahedra overlap a tile may be done twice: slices and counts are to be those of the owners, as voxels have
+/// them one by one.
+TEST_P(CoarseFields, ThatFoldTellTheSlicesAndCountsOfTheirOwners) {
+  Random random(test_seed(), 8'400'000);
+  SCOPED_TRACE(seed_text(test_seed()));
+  const Geometry output = unit_grid({36, 18, 7});
+  const auto source = random_values<std::int16_t>(output, random, 0, 100);
+  const auto resampler = make(output);
+  VertexField field = shaken(output, lattice_over(output, 6), 5, random);
+  for (glm::vec3& by : field.displacement) by.x += 4;  // so that nobody owns the first columns
+  resampler->set_field(view(field, Outside::background));
+  for (const Interpolation interpolation : {Interpolation::linear, Interpolation::nearest}) {
+    auto to = poisoned<std::int16_t>(output);
+    const auto sample = [&](const Region& region, std::span<SliceRange> slices) {
+      const Target target{.source = view(source),
+                          .output = view(to),
+                          .interpolation = interpolation,
+                          .background = 1e9,
+                          .sampled_slices = slices};
+      return resampler->resample(region, {&target, 1});
+    };
+    std::vector<SliceRange> found(7), expected(7);
+    const Report of_all = sample(whole(output), found);
+    Report one_by_one;
+    for_each_voxel(output, [&](const glm::i64vec3& voxel, std::size_t) {
+      one_by_one += sample({voxel, voxel + std::int64_t{1}}, expected);
+    });
+    EXPECT_GT(of_all.inverted, 5u);
+    EXPECT_GT(of_all.uncovered, 100u);
+    EXPECT_EQ(of_all.covered, one_by_one.covered);
+    EXPECT_EQ(of_all.uncovered, one_by_one.uncovered);
+    EXPECT_EQ(of_all.clamped, of_all.uncovered) << "the background does not fit";
+    EXPECT_EQ(of_all.clamped, one_by_one.clamped);
+    for (std::size_t k = 0; k < 7; ++k) {
+      EXPECT_EQ(found[k].first, expected[k].first) << k;
+      EXPECT_EQ(found[k].last, expected[k].last) << k;
+    }
   }
 }
 

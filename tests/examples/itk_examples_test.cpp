@@ -116,6 +116,7 @@ TEST_F(ItkExamples, DicomPipelineSaysWhereTheReadersDiffer) {
 }
 
 TEST_F(ItkExamples, SequenceGivesTheProgramsBitsInEveryPhaseAndMemoryDoesNotGrow) {
+  const NoDevices on_cpu;
   const Outcome run = example("sequence-4d", "ct.mha push.json phases");
   ASSERT_EQ(run.status, 0) << run.err;
   ASSERT_EQ(tetwarp("simulate push.json ct.mha -o field.mha --every 1 --backend cpu").status, 0);

@@ -6,8 +6,10 @@
 #include <sys/wait.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 
@@ -23,6 +25,28 @@ inline std::string read_text(const std::filesystem::path& path) {
   text << file.rdbuf();
   return text.str();
 }
+
+/// Hides CUDA devices from programs that are run while it stands: for tests of what the CPU does, or of memory, which
+/// the driver of a device takes as well.
+class NoDevices {
+ public:
+  NoDevices() {
+    if (const char* visible = std::getenv(kVariable)) before_ = visible;
+    ::setenv(kVariable, "", 1);
+  }
+  ~NoDevices() {
+    if (before_)
+      ::setenv(kVariable, before_->c_str(), 1);
+    else
+      ::unsetenv(kVariable);
+  }
+  NoDevices(const NoDevices&) = delete;
+  NoDevices& operator=(const NoDevices&) = delete;
+
+ private:
+  static constexpr const char* kVariable = "CUDA_VISIBLE_DEVICES";
+  std::optional<std::string> before_;
+};
 
 /// Runs `PROGRAM ARGUMENTS` in a folder, through the shell.
 inline Outcome run_program(const std::filesystem::path& folder, const std::string& program,

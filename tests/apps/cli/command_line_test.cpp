@@ -89,7 +89,7 @@ TEST_F(CommandLine, ASizeMayHaveAFraction) {
   for (const auto& [size, shown] :
        {std::pair("0.1G", "100 MB"), std::pair("0.1GB", "100 MB"), std::pair("0.1Gi", "107 MB"),
         std::pair("100MiB", "105 MB"), std::pair("90000K", "90 MB"), std::pair("0.0001t", "100 MB")}) {
-    const Outcome little = run("deform ct.nrrd -f identity -o o.nii --memory " + std::string(size));
+    const Outcome little = run("deform ct.nrrd -f identity -o o.nii --backend cpu --memory " + std::string(size));
     EXPECT_EQ(little.status, 1) << size;
     EXPECT_TRUE(says(little.err, {"--memory allows " + std::string(shown)})) << size;
   }

@@ -190,7 +190,7 @@ TEST(Deform, TheReportTellsWhatHappenedAndTheSidecarHasNoClock) {
   make_phantom_file(scratch, "in.mha");
   expect_run(scratch,
              "deform in.mha -f translate:by=2/0/0vox -o out.mha --coverage mask.nii.gz --report report.json --preview "
-             "look.png");
+             "look.png --backend cpu");
   const auto report = nlohmann::json::parse(read_text(scratch / "report.json"));
   EXPECT_EQ(report["report"]["covered"], 38 * 36 * 24);
   EXPECT_EQ(report["report"]["uncovered"], 2 * 36 * 24);

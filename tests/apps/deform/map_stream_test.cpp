@@ -52,7 +52,8 @@ TEST(MapStream, DeformHoldsTwoSlabsOfItsMapsAndPlansThem) {
   if (!kCountsMemory) GTEST_SKIP() << "a sanitizer takes memory of its own";
   const Scratch scratch;
   make_long_volume(scratch);
-  const std::string deform = "deform in.nii.gz -f translate:by=1/0/0 --outside background --cell-size 64 --overwrite ";
+  const std::string deform =
+      "deform in.nii.gz -f translate:by=1/0/0 --outside background --cell-size 64 --overwrite --backend cpu ";
   expect_run(scratch, deform + "-o plain.nii.gz --report plain.json");
   expect_run(scratch, deform + "-o out.nii.gz --inverse i.nii.gz --coverage c.nii.gz --report maps.json");
   const nlohmann::json plain = read_json(scratch / "plain.json")["memory"],
@@ -67,7 +68,9 @@ TEST(MapStream, InvertHoldsTwoSlabsOfTheInverse) {
   if (!kCountsMemory) GTEST_SKIP() << "a sanitizer takes memory of its own";
   const Scratch scratch;
   make_long_volume(scratch);
-  expect_run(scratch, "invert translate:by=0/0/0.25 --cell-size 64 --like in.nii.gz -o i.nii.gz --report report.json");
+  expect_run(
+      scratch,
+      "invert translate:by=0/0/0.25 --cell-size 64 --like in.nii.gz -o i.nii.gz --report report.json --backend cpu");
   const nlohmann::json report = read_json(scratch / "report.json");
   constexpr std::uint64_t kHeld = kTwoSlabs * kSlice * 12, kWhole = kSlices * kSlice * 12;
   EXPECT_LT(report["memory"]["peak_bytes"], (kHeld + kWhole) / 2);

@@ -377,6 +377,9 @@ json result_of(json report) {
   report.erase("backend");
   report.erase("device");
   report.erase("output");
+  report.erase("memory");  // of the process
+  report.erase("paths");
+  report.erase("total_seconds");
   if (report.contains("field") && report["field"].contains("simulation"))
     report["field"]["simulation"].erase("backend");
   return report;

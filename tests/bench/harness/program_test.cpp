@@ -240,7 +240,8 @@ TEST(BenchProgram, MeasuresFilesAndLeavesNoneBehind) {
 }
 
 TEST(BenchProgram, AJobThatMissesItsFloorFailsOnlyWhereItIsAsked) {
-  // A volume so small that starting the program takes longer than deforming it.
+  // A volume so small that starting the program takes longer than deforming it, without a device.
+  const NoDevices on_cpu;
   const Scratch scratch;
   const std::string job = std::string(kTinyIo) + "--steps job ";
   EXPECT_EQ(run_bench(scratch, job).status, 0);
