@@ -85,7 +85,7 @@ void IntervalWriter::finish_row(int y, int z, std::uint32_t stays) {
   const auto width = static_cast<int>(tile.box().end.x - tile.box().begin.x);
   const std::uint32_t all = ~0u >> (32 - width), covered = tile.covered(y, z), rests = stays & all & ~covered;
   if (to_->maps.wants_owners()) to_->maps.write_owners(first, width, tile.counts(y, z));
-  if (stays != 0) report_.conflicts += static_cast<std::uint64_t>(std::popcount(stays & all & covered));
+  if (stays != 0) report_.conflicts += static_cast<std::uint64_t>(std::popcount(stays & covered));
   if (rests != 0) {
     const auto row = static_cast<std::uint16_t>(y + kTile * z);
     append(&row, &rests, 1, [&](int from) { stay(from); });
