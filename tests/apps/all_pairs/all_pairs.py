@@ -32,7 +32,7 @@ except ImportError as error:
 import table
 from command import SCENARIOS, World
 from covering import Covering
-from judge import Truth, Wrong, check, check_alike, check_files, check_refusal, contents
+from judge import Truth, Wrong, check, check_alike, check_files, check_refusal, contents, without_backends
 from outputs import Outputs, check_privacy
 
 
@@ -152,7 +152,7 @@ class Cases:
         check_privacy({}, result.error, False)
         self.program.check_temporary()
         if case["run"] == "batch" and case["backend"] == "auto" and case["memory"] == "none":
-            (place / "m.jsonl").write_text(self.row(case) + "\n")
+            (place / "m.jsonl").write_text(self.world.row(case) + "\n")
             result = self.program.run(["batch", "m.jsonl", "-o", "results", "--quiet"], place)
             check(result.status in (3, 4), f"a batch of a case that is refused ends with status {result.status}")
             made = [name for name in contents(place / "results") if name.startswith(("one/", "."))] if (
@@ -170,21 +170,13 @@ class Cases:
             self.program.must(self.world.arguments(given, backend=backend), other)
             files[backend] = contents(other / "out")
         sidecar = self.world.output(case) + ".json"
-        documents = [json.loads(files[backend].pop(sidecar)) for backend in files]
-        for document in documents:
-            document.pop("backend")
+        documents = [without_backends(json.loads(files[backend].pop(sidecar))) for backend in files]
         check(documents[0] == documents[1], "another sidecar on the other backend")
         check_alike(files["cpu"], files["cuda"], "on the other backend")
 
-    def row(self, case):
-        row = json.loads(self.world.row(case))
-        if "springs" in case["field"]:
-            row["backend"] = "cpu"
-        return json.dumps(row)
-
     def in_batch(self, case, files):
         place = self.place("batch")
-        (place / "m.jsonl").write_text(self.row(case) + "\n")
+        (place / "m.jsonl").write_text(self.world.row(case) + "\n")
         result = self.program.run(["batch", "m.jsonl", "-o", "results", "--quiet"], place)
         check(result.status == 0, f"status {result.status} of a batch: {result.error!r}")
         made = contents(place / "results")
@@ -195,11 +187,10 @@ class Cases:
         of_case.pop("case.json")
         alone = dict(files)
         sidecar = self.world.output(case) + ".json"
-        texts = [json.loads(one.pop(sidecar).decode().replace("results/one/", "out/"))
+        texts = [without_backends(json.loads(one.pop(sidecar).decode().replace("results/one/", "out/")))
                  for one in (of_case, alone)]
         for text in texts:
-            for key in ("command", "backend"):
-                text.pop(key)
+            text.pop("command")
         check(texts[0] == texts[1], "another sidecar in a batch")
         for one in (of_case, alone):
             one.pop("r.json", None)
