@@ -134,7 +134,6 @@ class Reader {
   static std::vector<std::string> arguments_of(const ManifestRow& row, const Places& places, std::uint64_t variant);
   bool check_keys(const ManifestRow& row);
   static void check_files(const DeformOptions& options);
-  static void check_backend(const DeformOptions& options);
 
   fs::path base_, output_dir_;
   ManifestErrors errors_;
@@ -175,18 +174,12 @@ void Reader::check_files(const DeformOptions& options) {
             "no such file or folder, " + shown(path) + "; paths are relative to the manifest");
   };
   exists(options.input.path);
-  if (!options.scenario.empty()) exists(options.scenario);
+  if (!options.scenario.empty()) {
+    exists(options.scenario);
+    read_scenario(options.scenario);  // a page that cannot be read is found before any case begins
+  }
   const Reads others = other_reads_of(options, parse_sources(options));
   for (const fs::path& path : others.paths()) exists(path);
-}
-
-/// Refuses a mass-spring case that does not name its backend: each backend has other bits, and the case has to decide
-/// on them, not the machine.
-void Reader::check_backend(const DeformOptions& options) {
-  if (options.scenario.empty() || !leaves_open(options.backend)) return;
-  require(read_scenario(options.scenario).method != simulate::Method::mass_spring,
-          "a mass-spring scenario has other bits on each backend, " + shown(options.scenario) +
-              "; give the row backend cpu or cuda");
 }
 
 void Reader::take_variant(const ManifestRow& row, const std::string& id, std::uint64_t variant) {
@@ -203,10 +196,7 @@ void Reader::take_variant(const ManifestRow& row, const std::string& id, std::ui
     of.row = arguments_of(row, {}, variant);
     of.options = parse_deform(of.arguments);
     of.options.folder = folder;
-    if (variant == 0) {
-      check_files(of.options);
-      check_backend(of.options);
-    }
+    if (variant == 0) check_files(of.options);
     cases_.push_back(std::move(of));
   } catch (const Error& error) {
     errors_.add(row.line, error.what());
