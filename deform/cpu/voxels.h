@@ -44,7 +44,8 @@ struct Row {
 struct VoxelList {
   glm::i64vec3 first;  ///< first voxel of the tile
   int count;
-  const std::uint16_t* numbers;  ///< of each voxel: `number(x, y, z)`, counted from the first; `kRoomTogether` of them
+  /// Of each voxel: x + 32 y + 1024 z, counted from the first; `kRoomTogether` of them.
+  const std::uint16_t* numbers;
   /// Undeformed minus deformed place of each, voxels of output index; null for a coarse field.
   const glm::vec3* offset;
   const FixedOffsets* fixed;  ///< the same of a coarse field, else null
@@ -52,9 +53,6 @@ struct VoxelList {
   static constexpr int kAxisBits = 5;
   static_assert(kTile == 1 << kAxisBits);
 
-  static constexpr unsigned number(int x, int y, int z) {
-    return static_cast<unsigned>((z << kAxisBits | y) << kAxisBits | x);
-  }
   static glm::ivec3 in_tile(unsigned number) {
     return {number % kTile, number >> kAxisBits & (kTile - 1), number >> (2 * kAxisBits)};
   }

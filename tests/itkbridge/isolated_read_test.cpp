@@ -12,9 +12,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
-#include <optional>
 #include <thread>
 
 #include "deform/errors.h"
@@ -29,27 +27,6 @@ namespace {
 using Records = std::vector<ReadRecord>;
 
 constexpr IsolatedLimits kLimits = {.memory_bytes = std::size_t{128} << 20, .cpu_seconds = 60, .seconds = 60};
-
-/// An environment variable while this object lives.
-class Variable {
- public:
-  Variable(const char* name, const std::string& value) : name_(name) {
-    if (const char* const before = std::getenv(name)) before_ = before;
-    ::setenv(name, value.c_str(), 1);
-  }
-  ~Variable() {
-    if (before_)
-      ::setenv(name_, before_->c_str(), 1);
-    else
-      ::unsetenv(name_);
-  }
-  Variable(const Variable&) = delete;
-  Variable& operator=(const Variable&) = delete;
-
- private:
-  const char* name_;
-  std::optional<std::string> before_;
-};
 
 /// Reads by the program of the tests (read_program_for_tests.cpp), whose readers misbehave.
 class IsolatedRead : public testing::Test {

@@ -6,8 +6,6 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
 #include "deform/errors.h"
 #include "itkbridge/transform_file.h"
 #include "tests/itkbridge/itk_transforms.h"
@@ -74,9 +72,8 @@ TEST(ReadProgram, MissingIsAnErrorThatNamesItAndEveryPlace) {
                  (root / TETWARP_TEST_MODULE_FOLDER "/tetwarp-read").string() + ", ",
                  (root / TETWARP_TEST_LIBEXECDIR "/tetwarp/tetwarp-read").string(), "TETWARP_READ_PROGRAM"}));
   EXPECT_EQ(why.find("InputError"), std::string::npos) << "the file is not to blame: " << why;
-  ::setenv("TETWARP_READ_PROGRAM", TETWARP_READ_BUILT, 1);
+  const Variable named("TETWARP_READ_PROGRAM", TETWARP_READ_BUILT);
   EXPECT_EQ(read_by(scratch / kModule, scratch / "t.h5"), "AffineTransform_double_3_3");
-  ::unsetenv("TETWARP_READ_PROGRAM");
 }
 
 TEST(ReadProgram, DoesNothingByHand) {

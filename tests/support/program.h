@@ -26,26 +26,31 @@ inline std::string read_text(const std::filesystem::path& path) {
   return text.str();
 }
 
-/// Hides CUDA devices from programs that are run while it stands: for tests of what the CPU does, or of memory, which
-/// the driver of a device takes as well.
-class NoDevices {
+/// An environment variable while this object lives, of this process and of programs that it runs.
+class Variable {
  public:
-  NoDevices() {
-    if (const char* visible = std::getenv(kVariable)) before_ = visible;
-    ::setenv(kVariable, "", 1);
+  Variable(const char* name, const std::string& value) : name_(name) {
+    if (const char* const before = std::getenv(name)) before_ = before;
+    ::setenv(name, value.c_str(), 1);
   }
-  ~NoDevices() {
+  ~Variable() {
     if (before_)
-      ::setenv(kVariable, before_->c_str(), 1);
+      ::setenv(name_, before_->c_str(), 1);
     else
-      ::unsetenv(kVariable);
+      ::unsetenv(name_);
   }
-  NoDevices(const NoDevices&) = delete;
-  NoDevices& operator=(const NoDevices&) = delete;
+  Variable(const Variable&) = delete;
+  Variable& operator=(const Variable&) = delete;
 
  private:
-  static constexpr const char* kVariable = "CUDA_VISIBLE_DEVICES";
+  const char* name_;
   std::optional<std::string> before_;
+};
+
+/// Hides CUDA devices from programs that are run while it stands: for tests of what the CPU does, or of memory, which
+/// the driver of a device takes as well.
+struct NoDevices : Variable {
+  NoDevices() : Variable("CUDA_VISIBLE_DEVICES", "") {}
 };
 
 /// Runs `PROGRAM ARGUMENTS` in a folder, through the shell.

@@ -19,7 +19,7 @@ struct TileMap {
 
 /// Computes U of some voxels of a tile, with the widest vectors that the processor has (Highway). Up to `kRoomBehind`
 /// numbers behind the last voxel may be read, and as many of U be written.
-/// @param numbers  of the voxels, `VoxelList::number`
+/// @param numbers  of the voxels, `VoxelList::numbers`
 /// @param u        along i, j, k
 void fill_fixed_list(const TileMap& map, const std::uint16_t* numbers, int count, std::int32_t* const (&u)[3]);
 
