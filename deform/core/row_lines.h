@@ -233,13 +233,18 @@ class LinesAlongZ {
         apart_(4 << zone) {
     constexpr float kBefore = 0, kBehind = 1000;
     const float lift = detail::kLineLift + detail::two_to(zone - detail::kLineBits);
-    const auto set = [&](Line& line, const RowLine& from, bool any, float otherwise) {
-      line.at = any ? detail::multiply_add(from.along_y, static_cast<float>(y), from.at) + lift : otherwise;
-      line.along_z = any ? from.along_z : 0.0f;
+    float at[4];  // once each, not within the choices below
+    for (int n = 0; n < 4; ++n) {
+      const RowLine& line = lines[n];
+      at[n] = detail::multiply_add(line.along_y, static_cast<float>(y), line.at) + lift;
+    }
+    const auto set = [&](Line& line, int n, bool any, float otherwise) {
+      line.at = any ? at[n] : otherwise;
+      line.along_z = any ? lines[n].along_z : 0.0f;
     };
     for (int n = 0; n < 3; ++n) {
-      set(lower_[n], lines[n], n < lower, kBefore);
-      set(upper_[n], lines[3 - n], n < upper, kBehind);
+      set(lower_[n], n, n < lower, kBefore);
+      set(upper_[n], 3 - n, n < upper, kBehind);
     }
   }
 
