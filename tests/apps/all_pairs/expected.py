@@ -24,6 +24,7 @@ class Expected:
         self.is_same_grid = np.allclose(matrix, np.eye(4), atol=1e-9)
         if self.is_same_grid:
             matrix = np.eye(4)
+        self.is_exact = deformed.is_exact & self.is_same_grid
         place = (voxel + deformed.u) @ matrix[:3, :3].T + matrix[:3, 3]
         self.slack_of_place = deformed.tolerance * np.abs(matrix[:3, :3]).sum(1).max() + 1e-7  # kept in float
         if source.slices is not None:
@@ -61,7 +62,7 @@ class Expected:
         is_none = np.isnan(corners)
         corners = np.where(is_none, 0, corners)
         becomes_none = (is_none & (np.abs(weights) > little)).any(0)
-        self.doubtful |= (is_none & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0)
+        self.doubtful |= self.may_meet(np.isnan(values), base, t, interpolation, little) & ~becomes_none
         if interpolation == "cubic":  # weights that rounding keeps from being 0 would make NaN of NaN
             self.doubtful |= is_none.any(0)
         nearest = np.floor(place + 0.5).astype(int)
@@ -84,16 +85,26 @@ class Expected:
             return value, slack
         is_padding = corners == padding
         with_weight = (is_padding & (np.abs(weights) > little)).any(0)
-        self.doubtful |= (is_padding & self.may_weigh(weights) & (np.abs(weights) <= little)).any(0)
+        self.doubtful |= self.may_meet(values == padding, base, t, interpolation, little) & ~with_weight
         self.doubtful |= with_weight & is_half
         if interpolation == "nearest":
             with_weight = at_nearest == padding
         self.padded |= with_weight & (at_nearest == padding)
         return np.where(with_weight, at_nearest, value), np.where(with_weight, 0, slack)
 
-    def may_weigh(self, weights):
-        """Whether a weight may be other than zero: on one grid zero is exact, between grids it may be rounding."""
-        return weights != 0 if self.is_same_grid else np.ones(weights.shape, bool)
+    def may_meet(self, marked, base, t, interpolation, little):
+        """Whether a marked voxel may have a weight that rounding makes: on one grid a weight of zero is exact on an axis
+        along which all vertices move alike; else a place on a voxel may be rounded to either side of it."""
+        last, width = np.array(marked.shape) - 1, 2 if interpolation == "cubic" else 1
+        met = np.zeros(t.shape[:-1], bool)
+        if not marked.any():
+            return met
+        for step in itertools.product(range(-width, width + 2), repeat=3):
+            far = np.abs(t - np.array(step))
+            reached = (far < width) & ((far == 0) | (far % 1 != 0))
+            reached |= ~self.is_exact & (far <= width + little[..., None])
+            met |= reached.all(-1) & marked[tuple(np.clip(base[..., a] + step[a], 0, last[a]) for a in range(3))]
+        return met
 
     @staticmethod
     def weights(steps, t, interpolation):

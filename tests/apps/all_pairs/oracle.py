@@ -179,7 +179,7 @@ def condition(corner, volume):
 
 class Deformed:
     """Where voxels come from through a forward field. By voxel: `mapped`, `u` (undeformed minus deformed place,
-    voxels), its `tolerance`, `jacobian`, `doubtful`."""
+    voxels), its `tolerance` and on which axes it `is_exact`, `jacobian`, `doubtful`."""
 
     def __init__(self, tetrahedra, grid, outside):
         owners = Owners(tetrahedra, grid)
@@ -187,6 +187,7 @@ class Deformed:
         self.mapped = owners.lowest >= 0
         shape = tuple(owners.size)
         self.u, self.tolerance = np.zeros((*shape, 3)), np.full(shape, 1e-9)
+        self.is_exact = np.ones((*shape, 3), bool)
         self.jacobian = np.full(shape, np.nan)
         voxel = np.argwhere(self.mapped)
         number = owners.lowest[self.mapped]
@@ -201,6 +202,7 @@ class Deformed:
         at_rest = (owners.rest[owners.corners[number]] - owners.rest[owners.corners[number]][:, [3]]) * 16.0
         rest_volume = determinant(at_rest[:, 0], at_rest[:, 1], at_rest[:, 2])
         self.u[self.mapped] = (w[..., None] * vertex_u).sum(1)
+        self.is_exact[self.mapped] = (vertex_u == vertex_u[:, [3]]).all(1)  # else zero at a face may be rounded
         reach = np.abs(vertex_u[:, :3] - vertex_u[:, [3]]).max((1, 2))
         with np.errstate(divide="ignore", invalid="ignore"):
             self.jacobian[self.mapped] = volume / rest_volume
@@ -249,4 +251,5 @@ class Pulled:
         self.grid, self.mapped = grid, ~beyond & ~gone
         self.rests = beyond & (outside == "rest")
         self.tolerance = np.full(shape, 1e-6)
+        self.is_exact = np.ones((*shape, 3), bool)
         self.u[~self.mapped] = 0
