@@ -22,13 +22,14 @@ class CudaMachine {
   static constexpr Memory kMemory = Memory::device;
   static constexpr bool kReadsLinks = true;
   static constexpr std::size_t kNumbersOfVector = 4;  ///< of a Quad
+  static constexpr int kIterations = 128;             ///< most systems of a frame take fewer
   template <class T>
   using Buffer = DeviceBuffer<T>;
 
   CudaMachine(int device, std::size_t nodes) : device_(device) {
     const DeviceScope here(device_);
     of_block_.reserve(blocks_for(nodes));
-    of_other_block_.reserve(blocks_for(nodes));
+    products_.reserve(blocks_for(nodes));
     sums_.reserve(blocks_for(nodes));
     arrived_.fill(0, 1, nullptr);
     pinned_.reserve(1);
@@ -79,9 +80,9 @@ class CudaMachine {
   void solve(const SpringArrays& arrays, const SolveTask& task) {
     SpringArrays a = arrays;
     SolveTask given = task;
-    Sum *of_block = reinterpret_cast<Sum*>(of_block_.data()), *of_other = of_other_block_.data();
+    Products* products = products_.data();
     Sums* sums = sums_.data();
-    void* arguments[] = {&a, &given, &of_block, &of_other, &sums};
+    void* arguments[] = {&a, &given, &products, &sums};
     TETWARP_CUDA_TRY(cudaLaunchCooperativeKernel(reinterpret_cast<const void*>(solve_kernel), dim3(crew_), dim3(kBlock),
                                                  arguments, 0, stream_));
   }
@@ -95,7 +96,7 @@ class CudaMachine {
   unsigned crew_ = 1;  ///< blocks of `solve_kernel`
   cudaStream_t stream_ = nullptr;
   DeviceBuffer<Ways> of_block_;  ///< room for the largest of sums
-  DeviceBuffer<Sum> of_other_block_;
+  DeviceBuffer<Products> products_;
   DeviceBuffer<Sums> sums_;
   DeviceBuffer<unsigned> arrived_;
   cuda_detail::PinnedBuffer<Fetched> pinned_;

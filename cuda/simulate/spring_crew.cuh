@@ -64,14 +64,19 @@ __global__ void sum_kernel(Sweep sweep, Then then, std::size_t nodes, T* of_bloc
   }
 }
 
-/// Shared memory for the terms of a sum of a block.
+/// Shared memory for the terms of sums of a block.
 struct alignas(16) TermRoom {
   std::byte bytes[kBlock * sizeof(Sums)];
 
+  /// Sums of T for which there is room side by side.
   template <class T>
-  __device__ auto terms() -> T (&)[kBlock] {
-    static_assert(sizeof(T) <= sizeof(Sums));
-    return *reinterpret_cast<T(*)[kBlock]>(bytes);
+  static constexpr int sums() {
+    return static_cast<int>(sizeof(Sums) / sizeof(T));
+  }
+  template <class T>
+  __device__ auto terms(int number) -> T (&)[kBlock] {
+    static_assert(sums<T>() > 0);
+    return reinterpret_cast<T(*)[kBlock]>(bytes)[number];
   }
 };
 
@@ -79,11 +84,9 @@ struct alignas(16) TermRoom {
 /// same totals of what all left, a sum costs one wait for all.
 class SpringCrew {
  public:
-  /// @param of_block  room for the sum of each block of nodes  @param of_other  the same  @param sums  the same
-  /// @param rooms     two of them
-  __device__ SpringCrew(const SpringArrays& a, GradientState& state, TermRoom* rooms, Sum* of_block, Sum* of_other,
-                        Sums* sums)
-      : a_(a), state_(state), rooms_(rooms), of_block_(of_block), of_other_(of_other), sums_(sums) {}
+  /// @param products  room for those of each block of nodes  @param sums  the same
+  __device__ SpringCrew(const SpringArrays& a, GradientState& state, TermRoom& room, Products* products, Sums* sums)
+      : a_(a), state_(state), room_(room), products_(products), sums_(sums) {}
 
   /// See `solve_part`.
   __device__ void set_up(const SolveTask& task) {
@@ -99,22 +102,20 @@ class SpringCrew {
       } else {
         sweeps::Forces::at(a_, n);
       }
+      sweeps::Begin::at(a_, n);
     });
-    if (task.follows) wait();  // p was read, and is written now
-    const Sum rz = total([&](std::size_t n) { return sweeps::Begin::at(a_, n); }, of_other_);
-    by_first([&] { sweeps::AfterBegin{&state_, task.effort}(rz); });
+    by_first([&] { state_ = {.effort = task.effort}; });
+    wait();
   }
 
   __device__ void iterate(Stiffness kind, int times) {
     for (int n = 0; n < times && !state_.is_done; ++n) {
-      const Sum curvature = total([&](std::size_t node) { return sweeps::Bend::at(a_, kind, node); }, of_block_);
-      by_first([&] { sweeps::AfterBend{&state_}(curvature); });
-      if (state_.is_done) return;
-      const Sum next = total(
-          [&, length = state_.length](std::size_t node) { return sweeps::Descend::at(a_, length, node); }, of_other_);
-      by_first([&] { sweeps::AfterDescend{&state_}(next); });
-      if (state_.is_done) return;
-      each([&, share = state_.share](std::size_t node) { sweeps::NextDirection::at(a_, share, node); });
+      const Products sums = total([&](std::size_t node) { return sweeps::Bend::at(a_, kind, node); }, products_);
+      by_first([&] { sweeps::AfterBend{&state_}(sums); });
+      if (!state_.descends) return;
+      each([&, share = state_.share, length = state_.length](std::size_t node) {
+        sweeps::Descend::at(a_, share, length, node);
+      });
       wait();
     }
   }
@@ -123,8 +124,6 @@ class SpringCrew {
     if (follows) {
       each([&](std::size_t n) { sweeps::Follow::at(a_, n); });
     } else {
-      const Sums direction = total([&](std::size_t n) { return sweeps::SearchDirection::at(a_, n); }, sums_);
-      by_first([&] { state_.direction = direction; });
       each([&](std::size_t n) { sweeps::Go::at(a_, 1, n); });
     }
     wait();
@@ -150,21 +149,24 @@ class SpringCrew {
   /// @return what `sum_kernel` gives, in the first thread of each block
   template <class T, class Sweep>
   __device__ T total(const Sweep& sweep, T* of_block) const {
-    // When a block has arrived in the next room, all of it is done with the one before.
-    int room = 0;
-    for (unsigned block = blockIdx.x; block < blocks_; block += gridDim.x, room ^= 1) {
+    // When the block has arrived with the terms of another sum, all of it is done with the ones before.
+    constexpr bool is_roomy = TermRoom::sums<T>() >= 2;
+    int number = 0;
+    for (unsigned block = blockIdx.x; block < blocks_; block += gridDim.x, number ^= 1) {
       const std::size_t n = std::size_t{block} * kBlock + threadIdx.x;
-      const T sum = cuda_detail::sum_of_block(n < a_.nodes ? sweep(n) : T{}, rooms_[room].template terms<T>());
+      const T own = n < a_.nodes ? sweep(n) : T{};
+      if constexpr (!is_roomy) __syncthreads();
+      const T sum = cuda_detail::sum_of_block(own, room_.template terms<T>(is_roomy ? number : 0));
       if (threadIdx.x == 0) of_block[block] = sum;
     }
     wait();
-    return sum_of_blocks(of_block, blocks_, rooms_[0].template terms<T>());
+    return sum_of_blocks(of_block, blocks_, room_.template terms<T>(0));
   }
 
   const SpringArrays& a_;
   GradientState& state_;
-  TermRoom* rooms_;
-  Sum *of_block_, *of_other_;
+  TermRoom& room_;
+  Products* products_;
   Sums* sums_;
   const unsigned blocks_ = static_cast<unsigned>((a_.nodes + kBlock - 1) / kBlock);
 };
@@ -172,13 +174,13 @@ class SpringCrew {
 /// What `solve_part` does, in one cooperative launch.
 ///
 /// @param a         `state` is read, and written at the end
-/// @param of_block  see SpringCrew
+/// @param products  see SpringCrew
 __global__ void __launch_bounds__(kBlock, kCrewPerProcessor)
-    solve_kernel(const __grid_constant__ SpringArrays a, const __grid_constant__ SolveTask task, Sum* of_block,
-                 Sum* of_other, Sums* sums) {
+    solve_kernel(const __grid_constant__ SpringArrays a, const __grid_constant__ SolveTask task, Products* products,
+                 Sums* sums) {
   __shared__ GradientState state;
-  __shared__ TermRoom rooms[2];
-  SpringCrew crew(a, state, rooms, of_block, of_other, sums);
+  __shared__ TermRoom room;
+  SpringCrew crew(a, state, room, products, sums);
   if (task.resumes) {
     if (threadIdx.x == 0) state = *a.state;
     __syncthreads();

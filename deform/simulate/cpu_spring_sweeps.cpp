@@ -27,7 +27,7 @@ using Floats = hn::CappedTag<float, 16>;
 /// Springs in one direction at some displacement.
 struct Springs {
   hn::Vec<Doubles> x, y, z;  ///< from a node to its neighbour
-  hn::Vec<Doubles> length, elongation;
+  hn::Vec<Doubles> length, tension;
 
   /// Computes what `stretched` computes, with the same operations.
   HWY_INLINE Springs(const RestLink<double>& rest, const NodeVectors<double>& u, std::size_t n,
@@ -44,7 +44,7 @@ struct Springs {
     const auto grown = hn::Add(hn::Add(across, across), square);
     const double at_rest = rest.length * rest.length;
     length = hn::Sqrt(hn::Max(hn::Add(hn::Set(d, at_rest), grown), hn::Set(d, 1e-12 * at_rest)));
-    elongation = hn::Div(grown, hn::Add(length, hn::Set(d, rest.length)));
+    tension = hn::Mul(grown, hn::Div(hn::Set(d, 1), hn::Mul(length, hn::Add(length, hn::Set(d, rest.length)))));
     x = hn::Add(rx, ex);
     y = hn::Add(ry, ey);
     z = hn::Add(rz, ez);
@@ -75,8 +75,8 @@ void pulls(const SpringGrid& grid, NodeRange range, const SpringArrays& a, doubl
       const LinkSide way(a, direction);
       const Springs springs(a.rest[direction], a.trial, n, way.distance);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(way.up) + n + way.kept));
-      const auto pull = hn::Mul(k, springs.elongation), share = hn::Div(pull, springs.length);
-      energy = hn::Add(energy, hn::Mul(pull, springs.elongation));
+      const auto share = hn::Mul(k, springs.tension), elongation = hn::Mul(springs.tension, springs.length);
+      energy = hn::Add(energy, hn::Mul(k, hn::Mul(elongation, elongation)));
       fx = hn::Add(fx, hn::Mul(share, springs.x));
       fy = hn::Add(fy, hn::Mul(share, springs.y));
       fz = hn::Add(fz, hn::Mul(share, springs.z));
@@ -88,6 +88,24 @@ void pulls(const SpringGrid& grid, NodeRange range, const SpringArrays& a, doubl
   }
 }
 
+/// Numbers of the CPU's vectors that KeptMatrix keeps.
+using Kept = hn::Rebind<std::uint16_t, Floats>;
+
+/// Computes what Bfloat16 makes of a float.
+HWY_INLINE void keep(hn::Vec<Halves> value, Bfloat16* to) {
+  const hn::RebindToUnsigned<Halves> d;
+  const auto whole = hn::BitCast(d, value);
+  const auto odd = hn::And(hn::ShiftRight<16>(whole), hn::Set(d, 1));
+  const auto upper = hn::ShiftRight<16>(hn::Add(whole, hn::Add(hn::Set(d, 0x7fff), odd)));
+  const hn::Rebind<std::uint16_t, Halves> kept;
+  hn::StoreU(hn::TruncateTo(kept, upper), kept, reinterpret_cast<std::uint16_t*>(to));
+}
+HWY_INLINE hn::Vec<Floats> kept_at(const Bfloat16* from) {
+  const hn::RebindToUnsigned<Floats> d;
+  const auto upper = hn::PromoteTo(d, hn::LoadU(Kept(), reinterpret_cast<const std::uint16_t*>(from)));
+  return hn::BitCast(Floats(), hn::ShiftLeft<16>(upper));
+}
+
 /// @param kind  not `laplacian`, for which no matrices are kept
 void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, Stiffness kind) {
   const Doubles d;
@@ -96,12 +114,12 @@ void matrices(const SpringGrid& grid, NodeRange range, const SpringArrays& a, St
     for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
       const Springs springs(a.rest[up + kUp], a.u, n, a.distance[up + kUp]);
       const auto k = hn::PromoteTo(d, hn::LoadU(df, grid.constants(up) + n));
-      auto t = hn::Div(springs.elongation, springs.length);
+      auto t = springs.tension;
       if (kind == Stiffness::projected) t = hn::Max(t, hn::Zero(d));
       const auto even = hn::Mul(k, t);
       const auto root = hn::Div(hn::Sqrt(hn::Max(hn::Sub(k, even), hn::Zero(d))), springs.length);
       const auto store = [&](std::size_t e, hn::Vec<Doubles> value)
-                             HWY_ATTR { hn::StoreU(hn::DemoteTo(df, value), df, a.matrix.entry(up, e) + n); };
+                             HWY_ATTR { keep(hn::DemoteTo(df, value), a.matrix.entry(up, e) + n); };
       store(0, hn::Mul(root, springs.x));
       store(1, hn::Mul(root, springs.y));
       store(2, hn::Mul(root, springs.z));
@@ -118,7 +136,7 @@ void matrix_sums(NodeRange range, const SpringArrays& a, const NodeMatrices& sum
     auto xx = hn::Zero(d), xy = hn::Zero(d), xz = hn::Zero(d), yy = hn::Zero(d), yz = hn::Zero(d), zz = hn::Zero(d);
     for (int direction = 0; direction < kDirections; ++direction) {
       const LinkSide way(a, direction);
-      const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
+      const auto entry = [&](std::size_t e) HWY_ATTR { return kept_at(a.matrix.entry(way.up, e) + n + way.kept); };
       const auto x = entry(0), y = entry(1), z = entry(2), even = entry(3);
       xx = hn::Add(xx, hn::Add(hn::Mul(x, x), even));
       xy = hn::Add(xy, hn::Mul(x, y));
@@ -167,16 +185,16 @@ HWY_INLINE void put(const Vectors& v, const NodeVectors<float>& to, std::size_t 
   hn::StoreU(v.z, d, to.axis(2) + n);
 }
 
-/// Sums, over the regular links of each node, of the link's matrix times p of the node minus that of the neighbour.
-void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& result) {
+/// Sums, over the regular links of each node, of the link's matrix times the node's vector minus the neighbour's.
+void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& v, const NodeVectors<float>& result) {
   const Floats d;
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
-    const Vectors own = vectors_at(a.p, n);
+    const Vectors own = vectors_at(v, n);
     Vectors sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     for (int direction = 0; direction < kDirections; ++direction) {
       const LinkSide way(a, direction);
-      const auto entry = [&](std::size_t e) HWY_ATTR { return hn::LoadU(d, a.matrix.entry(way.up, e) + n + way.kept); };
-      const Vectors by = difference(own, vectors_at(a.p, n + way.distance));
+      const auto entry = [&](std::size_t e) HWY_ATTR { return kept_at(a.matrix.entry(way.up, e) + n + way.kept); };
+      const Vectors by = difference(own, vectors_at(v, n + way.distance));
       const auto ax = entry(0), ay = entry(1), az = entry(2), even = entry(3);
       const auto along = hn::Add(hn::Add(hn::Mul(ax, by.x), hn::Mul(ay, by.y)), hn::Mul(az, by.z));
       sum.x = hn::Add(sum.x, hn::Add(hn::Mul(ax, along), hn::Mul(even, by.x)));
@@ -188,16 +206,16 @@ void product(NodeRange range, const SpringArrays& a, const NodeVectors<float>& r
 }
 
 /// `product` of springs that keep their directions.
-void constant_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a,
+void constant_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, const NodeVectors<float>& v,
                       const NodeVectors<float>& result) {
   const Floats d;
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
-    const Vectors own = vectors_at(a.p, n);
+    const Vectors own = vectors_at(v, n);
     Vectors sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     for (int direction = 0; direction < kDirections; ++direction) {
       const LinkSide way(a, direction);
       const auto even = hn::LoadU(d, grid.constants(way.up) + n + way.kept);
-      const Vectors by = difference(own, vectors_at(a.p, n + way.distance));
+      const Vectors by = difference(own, vectors_at(v, n + way.distance));
       sum.x = hn::Add(sum.x, hn::Mul(even, by.x));
       sum.y = hn::Add(sum.y, hn::Mul(even, by.y));
       sum.z = hn::Add(sum.z, hn::Mul(even, by.z));
@@ -224,18 +242,23 @@ void descend(NodeRange range, const SpringArrays& a) {
   const Floats d;
   const hn::RebindToSigned<Floats> di;
   const hn::Rebind<std::uint8_t, Floats> du;
-  const auto length = hn::Set(d, a.state->length);
+  const auto length = hn::Set(d, a.state->length), share = hn::Set(d, a.state->share);
   const auto* role = reinterpret_cast<const std::uint8_t*>(a.role);
   for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
     const auto roles = hn::PromoteTo(di, hn::LoadU(du, role + n));
     const auto is_free = hn::RebindMask(d, hn::Eq(roles, hn::Set(di, static_cast<std::int32_t>(SpringRole::free))));
-    // Where a node is not free p and r are 0, and x stays as it is.
+    // Where a node is not free z is 0, and with s, x, r and p stay so.
     const auto step = [&](std::size_t axis) HWY_ATTR {
       const auto at = [&](const NodeVectors<float>& v) HWY_ATTR { return hn::LoadU(d, v.axis(axis) + n); };
-      hn::StoreU(hn::Add(at(a.x), hn::Mul(length, at(a.p))), d, a.x.axis(axis) + n);
-      const auto before = at(a.r);
-      const auto r = hn::IfThenElse(is_free, hn::Sub(before, hn::Mul(length, at(a.q))), before);
-      hn::StoreU(r, d, a.r.axis(axis) + n);
+      const auto put = [&](hn::Vec<Floats> value, const NodeVectors<float>& v)
+                           HWY_ATTR { hn::StoreU(value, d, v.axis(axis) + n); };
+      const auto p = hn::Add(at(a.z), hn::Mul(share, at(a.p)));
+      const auto s = hn::IfThenElseZero(is_free, hn::Add(at(a.q), hn::Mul(share, at(a.s))));
+      const auto r = hn::Sub(at(a.r), hn::Mul(length, s));
+      put(p, a.p);
+      put(s, a.s);
+      put(hn::Add(at(a.x), hn::Mul(length, p)), a.x);
+      put(r, a.r);
       return r;
     };
     const auto x = step(0), y = step(1), z = step(2);
@@ -245,17 +268,6 @@ void descend(NodeRange range, const SpringArrays& a) {
       hn::StoreU(sum, d, a.z.axis(axis) + n);
     };
     row(0, 0, 1, 2), row(1, 1, 3, 4), row(2, 2, 4, 5);
-  }
-}
-
-void next_direction(NodeRange range, const SpringArrays& a) {
-  const Floats d;
-  const auto share = hn::Set(d, a.state->share);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    float* const p = a.p.axis(axis);
-    for (std::size_t n = range.begin; n < range.end; n += hn::Lanes(d)) {
-      hn::StoreU(hn::Add(hn::LoadU(d, a.z.axis(axis) + n), hn::Mul(share, hn::LoadU(d, p + n))), d, p + n);
-    }
   }
 }
 
@@ -275,7 +287,6 @@ HWY_EXPORT(product);
 HWY_EXPORT(constant_product);
 HWY_EXPORT(dots);
 HWY_EXPORT(descend);
-HWY_EXPORT(next_direction);
 
 namespace {
 
@@ -292,28 +303,18 @@ Stretched<double> odd_spring(const SpringArrays& a, const OddLink& link, const N
   return stretched(a.rest[link.direction], u[link.other] - u[link.node]);
 }
 
-/// Sets `result` to the sums of Bend over all links.
+/// Sets `result` to what `sweeps::product` gives of each node.
 void whole_product(const SpringGrid& grid, NodeRange range, const SpringArrays& a, Stiffness kind,
-                   const NodeVectors<float>& result) {
+                   const NodeVectors<float>& v, const NodeVectors<float>& result) {
   if (kind == Stiffness::laplacian) {
-    HWY_DYNAMIC_DISPATCH(constant_product)(grid, range, a, result);
+    HWY_DYNAMIC_DISPATCH(constant_product)(grid, range, a, v, result);
   } else {
-    HWY_DYNAMIC_DISPATCH(product)(range, a, result);
+    HWY_DYNAMIC_DISPATCH(product)(range, a, v, result);
   }
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
-    const glm::vec3 share = grid.odd_matrix[number] * (a.p[link.node] - a.p[link.other]);
+    const glm::vec3 share = grid.odd_matrix[number] * (v[link.node] - v[link.other]);
     result.set(link.node, result[link.node] + share);
   });
-}
-
-/// Gives the products of two vectors of free nodes, 0 for others.
-void give_dots(NodeRange range, const SpringArrays& a, const NodeVectors<float>& one, const NodeVectors<float>& other,
-               Sum* sums) {
-  double products[SpringGrid::kBlock];
-  HWY_DYNAMIC_DISPATCH(dots)(range, one, other, products);
-  for (std::size_t n = range.begin; n < range.end; ++n) {
-    sums[n - range.begin].sum = a.is_free(n) ? products[n - range.begin] : 0;
-  }
 }
 
 }  // namespace
@@ -321,8 +322,12 @@ void give_dots(NodeRange range, const SpringArrays& a, const NodeVectors<float>&
 void sweep(SpringGrid& grid, NodeRange range, const sweeps::Matrices& matrices) {
   if (matrices.kind != Stiffness::laplacian) HWY_DYNAMIC_DISPATCH(matrices)(grid, range, matrices.a, matrices.kind);
   for_odd_links(grid, range, [&](const OddLink& link, std::size_t number) {
-    grid.odd_matrix[number] =
-        spring_matrix(odd_spring(matrices.a, link, matrices.a.u), double{link.stiffness}, matrices.kind);
+    if (matrices.kind == Stiffness::laplacian) {
+      grid.odd_matrix[number] = {glm::vec3(0), link.stiffness};
+      return;
+    }
+    const Stretched<double> spring = odd_spring(matrices.a, link, matrices.a.u);
+    grid.odd_matrix[number] = KeptMatrix(spring_matrix(spring, double{link.stiffness}, matrices.kind)).in_float();
   });
 }
 
@@ -343,18 +348,24 @@ void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inve
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::PlacedForces& forces) {
-  whole_product(grid, range, forces.a, forces.kind, forces.a.r);
+  whole_product(grid, range, forces.a, forces.kind, forces.a.q, forces.a.r);
   for (std::size_t n = range.begin; n < range.end; ++n) forces.finish(forces.a, n, forces.a.r[n]);
 }
 
-void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Sum* sums) {
-  whole_product(grid, range, bend.a, bend.kind, bend.a.q);
-  give_dots(range, bend.a, bend.a.p, bend.a.q, sums);
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Products* sums) {
+  const SpringArrays& a = bend.a;
+  whole_product(grid, range, a, bend.kind, a.z, a.q);
+  double rz[SpringGrid::kBlock], zq[SpringGrid::kBlock];
+  HWY_DYNAMIC_DISPATCH(dots)(range, a.r, a.z, rz);
+  HWY_DYNAMIC_DISPATCH(dots)(range, a.z, a.q, zq);
+  for (std::size_t n = range.begin; n < range.end; ++n) {
+    const std::size_t of = n - range.begin;
+    sums[of] = a.is_free(n) ? Products{rz[of], zq[of]} : Products{};
+  }
 }
 
-void sweep(const SpringGrid&, NodeRange range, const sweeps::Descend& descend, Sum* sums) {
+void sweep(const SpringGrid&, NodeRange range, const sweeps::Descend& descend) {
   HWY_DYNAMIC_DISPATCH(descend)(range, descend.a);
-  give_dots(range, descend.a, descend.a.r, descend.a.z, sums);
 }
 
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::StrainOf& strain, Sums* sums) {
@@ -369,10 +380,6 @@ void sweep(const SpringGrid& grid, NodeRange range, const sweeps::StrainOf& stra
   for (std::size_t n = range.begin; n < range.end; ++n) {
     sums[n - range.begin] = strain.finish(strain.a, n, force[n], energies[n - range.begin]);
   }
-}
-
-void sweep(const SpringGrid&, NodeRange range, const sweeps::NextDirection& next) {
-  HWY_DYNAMIC_DISPATCH(next_direction)(range, next.a);
 }
 
 }  // namespace tetwarp::simulate

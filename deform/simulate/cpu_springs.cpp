@@ -73,7 +73,7 @@ class CpuMachine : public HostMachine<SpringGrid::kLanes> {
   SpringGrid grid_;
   cpu::Arena arena_;
   std::size_t blocks_;
-  std::tuple<std::vector<Sum>, std::vector<Sums>, std::vector<Ways>> sums_;
+  std::tuple<std::vector<Products>, std::vector<Sums>, std::vector<Ways>> sums_;
 };
 
 }  // namespace

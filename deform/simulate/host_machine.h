@@ -17,6 +17,7 @@ class HostMachine {
  public:
   static constexpr Memory kMemory = Memory::host;
   static constexpr std::size_t kNumbersOfVector = 3;
+  static constexpr int kIterations = 32;
 
   template <class T>
   class Buffer {

@@ -22,7 +22,7 @@ enum class Method : std::uint8_t {
 };
 
 /// The state of a method's arithmetic: it rises whenever the same scenario gives a field of other bits.
-constexpr int version_of(Method method) { return method == Method::mass_spring ? 2 : 1; }
+constexpr int version_of(Method method) { return method == Method::mass_spring ? 3 : 1; }
 
 /// A tissue and the cells that it fills: those that meet all of its conditions.
 struct TissueClass {

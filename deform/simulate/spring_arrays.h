@@ -3,6 +3,7 @@
 
 #pragma once
 
+#include <bit>
 #include <cstdint>
 
 #include "deform/simulate/rigid_motion.h"
@@ -59,28 +60,50 @@ struct NodeMatrices {
   }
 };
 
-/// The matrix of the link up from each node in each direction kUp + up: the entries across.x, across.y, across.z and
-/// even, apart in host memory, a Quad on a device.
-struct LinkMatrices {
+/// The upper half of a float (bfloat16): its range, and 8 bits of precision. Rounds to the nearest, ties to even.
+struct Bfloat16 {
+  std::uint16_t bits = 0;
+
+  Bfloat16() = default;
+  TETWARP_HD explicit Bfloat16(double number) {
+    const auto whole = std::bit_cast<std::uint32_t>(static_cast<float>(number));
+    bits = static_cast<std::uint16_t>((whole + 0x7fff + (whole >> 16 & 1)) >> 16);
+  }
+  TETWARP_HD operator float() const { return std::bit_cast<float>(std::uint32_t{bits} << 16); }
+};
+
+/// The matrix of a link as it is kept. What a product with all matrices costs is reading them, and a direction that is
+/// sought need not be exact.
+struct alignas(8) KeptMatrix {
   static constexpr std::size_t kEntries = 4;
-  float* data = nullptr;
+  Bfloat16 x, y, z, even;
+
+  TETWARP_HD explicit KeptMatrix(const SpringMatrix<double>& m)
+      : x(m.across.x), y(m.across.y), z(m.across.z), even(m.even) {}
+  TETWARP_HD SpringMatrix<float> in_float() const { return {{x, y, z}, even}; }
+};
+
+/// The matrix of the link up from each node in each direction kUp + up. In host memory the entries of KeptMatrix are
+/// apart.
+struct LinkMatrices {
+  Bfloat16* data = nullptr;
   std::size_t stride = 0;
 
 #ifdef TETWARP_ON_DEVICE
-  TETWARP_HD SpringMatrix<float> get(std::size_t up, std::size_t n) const {
-    const Quad<float> m = reinterpret_cast<const Quad<float>*>(data)[up * stride + n];
-    return {{m.x, m.y, m.z}, m.w};
+  TETWARP_HD KeptMatrix& at(std::size_t up, std::size_t n) const {
+    return reinterpret_cast<KeptMatrix*>(data)[up * stride + n];
   }
-  TETWARP_HD void set(std::size_t up, std::size_t n, const SpringMatrix<float>& m) const {
-    reinterpret_cast<Quad<float>*>(data)[up * stride + n] = {m.across.x, m.across.y, m.across.z, m.even};
-  }
+  TETWARP_HD SpringMatrix<float> get(std::size_t up, std::size_t n) const { return at(up, n).in_float(); }
+  TETWARP_HD void set(std::size_t up, std::size_t n, const KeptMatrix& m) const { at(up, n) = m; }
 #else
-  TETWARP_HD float* entry(std::size_t up, std::size_t e) const { return data + (kEntries * up + e) * stride; }
+  TETWARP_HD Bfloat16* entry(std::size_t up, std::size_t e) const {
+    return data + (KeptMatrix::kEntries * up + e) * stride;
+  }
   TETWARP_HD SpringMatrix<float> get(std::size_t up, std::size_t n) const {
     return {{entry(up, 0)[n], entry(up, 1)[n], entry(up, 2)[n]}, entry(up, 3)[n]};
   }
-  TETWARP_HD void set(std::size_t up, std::size_t n, const SpringMatrix<float>& m) const {
-    entry(up, 0)[n] = m.across.x, entry(up, 1)[n] = m.across.y, entry(up, 2)[n] = m.across.z, entry(up, 3)[n] = m.even;
+  TETWARP_HD void set(std::size_t up, std::size_t n, const KeptMatrix& m) const {
+    entry(up, 0)[n] = m.x, entry(up, 1)[n] = m.y, entry(up, 2)[n] = m.z, entry(up, 3)[n] = m.even;
   }
 #endif
 };
@@ -91,9 +114,10 @@ struct GradientState {
   double rz = 0, least = 0, gained = 0;
   float length = 0, share = 0;
   int iterations = 0;
-  bool is_indefinite = false, is_done = false;
-  Sums direction = {};  ///< of SearchDirection, once conjugate gradients are done
-  Sums there = {};      ///< of StrainOf, at the displacement to which the direction leads
+  bool is_indefinite = false;
+  bool descends = false;  ///< whether the last Bend found a way that Descend is to go
+  bool is_done = false;   ///< after that way, if there is one
+  Sums there = {};        ///< of StrainOf, at the displacement to which the direction leads
 };
 
 /// A system of springs that is to be solved, in one go or part by part.
@@ -126,7 +150,8 @@ struct SpringArrays {
   /// Force on free nodes, N: now, at the start, and at the goal.
   NodeVectors<double> load, load_from, load_to;
   NodeVectors<double> force, trial_force;  ///< net force on free nodes at u and at trial, N
-  NodeVectors<float> x, r, z, p, q;        ///< the direction that is sought, and vectors of conjugate gradients
+  NodeVectors<float> x;                    ///< the direction that is sought
+  NodeVectors<float> r, z, q, p, s;        ///< of conjugate gradients: q = A z, s = A p
   LinkMatrices matrix;
   NodeMatrices inverse;  ///< by free node: the inverse of its sum of matrices; 0 for other nodes
   glm::vec3* shown;

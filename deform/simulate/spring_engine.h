@@ -26,25 +26,27 @@ struct Strain {
   double slope = 0;         ///< N mm: minus the net forces on free nodes times the direction (see SpringEngine::solve)
 };
 
-/// The sums of what a sweep returns for each node, and the largest squares that it saw.
+/// What a sweep over all nodes finds where a direction leads: sums, and the largest squares.
 struct Sums {
-  double sum = 0, slope = 0, most = 0, most_placed = 0, most_load = 0;
+  double energy = 0, slope = 0, slope_before = 0;                 ///< the second: where the direction begins
+  double free_force = 0, placed_force = 0, load = 0, length = 0;  ///< squares; the last: of the direction's vectors
 
   TETWARP_HD void add(const Sums& other) {
-    sum += other.sum;
+    energy += other.energy;
     slope += other.slope;
-    keep(most, other.most);
-    keep(most_placed, other.most_placed);
-    keep(most_load, other.most_load);
+    slope_before += other.slope_before;
+    keep(free_force, other.free_force);
+    keep(placed_force, other.placed_force);
+    keep(load, other.load);
+    keep(length, other.length);
   }
   TETWARP_HD static void keep(double& most, double value) {
     if (value > most) most = value;
   }
-  /// Of a sweep that computes the strain: energies, slopes and squares of forces.
   Strain strain() const {
-    return {.energy = sum,
-            .free_force = std::sqrt(most),
-            .placed_force = std::sqrt(std::max(most_placed, most_load)),
+    return {.energy = energy,
+            .free_force = std::sqrt(free_force),
+            .placed_force = std::sqrt(std::max(placed_force, load)),
             .slope = slope};
   }
 };

@@ -51,9 +51,8 @@ void sweep(SpringGrid& grid, NodeRange range, const sweeps::Matrices& matrices);
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Inverses& inverses);
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::PlacedForces& forces);
 /// @param sums  by node, from the first of the range on: what the sweep returns
-void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Sum* sums);
-void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Descend& descend, Sum* sums);
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Bend& bend, Products* sums);
 void sweep(const SpringGrid& grid, NodeRange range, const sweeps::StrainOf& strain, Sums* sums);
-void sweep(const SpringGrid& grid, NodeRange range, const sweeps::NextDirection& next);
+void sweep(const SpringGrid& grid, NodeRange range, const sweeps::Descend& descend);
 
 }  // namespace tetwarp::simulate

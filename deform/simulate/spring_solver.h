@@ -39,11 +39,8 @@ T sum_of_blocks(std::span<const T> of_block) {
 template <class Machine>
 void iterate_gradients(Machine& machine, const SpringArrays& a, Stiffness kind, int times) {
   for (int n = 0; n < times && !a.state->is_done; ++n) {
-    machine.template sum<Sum>(a.nodes, sweeps::Bend{{a}, kind}, sweeps::AfterBend{a.state});
-    if (a.state->is_done) return;
-    machine.template sum<Sum>(a.nodes, sweeps::Descend{{a}}, sweeps::AfterDescend{a.state});
-    if (a.state->is_done) return;
-    machine.each(a.nodes, sweeps::NextDirection{{a}});
+    machine.template sum<Products>(a.nodes, sweeps::Bend{{a}, kind}, sweeps::AfterBend{a.state});
+    if (a.state->descends) machine.each(a.nodes, sweeps::Descend{{a}});
   }
 }
 
@@ -60,26 +57,26 @@ void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) 
     } else {
       machine.each(a.nodes, sweeps::Forces{{a}});
     }
-    machine.template sum<Sum>(a.nodes, sweeps::Begin{{a}}, sweeps::AfterBegin{a.state, task.effort});
+    machine.each(a.nodes, sweeps::Begin{{a}});
+    *a.state = {.effort = task.effort};
   }
   iterate_gradients(machine, a, task.kind, task.times);
   if (!a.state->is_done && !task.ends) return;
   if (task.follows) {
     machine.each(a.nodes, sweeps::Follow{{a}});
   } else {
-    machine.template sum<Sums>(a.nodes, sweeps::SearchDirection{{a}}, sweeps::Keep{&a.state->direction});
     machine.each(a.nodes, sweeps::Go{{a}, 1});
   }
   machine.template sum<Sums>(a.nodes, sweeps::StrainOf{{a}}, sweeps::Keep{&a.state->there});
 }
 
 /// Mass-spring on a machine that runs sweeps over nodes. The same code runs on the CPU and on devices, and gives the
-/// same bits. Only sums and, every kIterations iterations, the state of conjugate gradients leave the machine's memory.
-/// A machine is
+/// same bits. Only sums and, now and then, the state of conjugate gradients leave the machine's memory. A machine is
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
 ///     kReadsLinks;                               // whether it calls sweeps that read the table of links
 ///     kNumbersOfVector;                          // that NodeVectors has in its memory
+///     kIterations;                               // between questions whether to stop
 ///     std::size_t padding();                     // numbers that vectors have before the first node and after the last
 ///     scope();                                   // what it returns holds while the machine is used
 ///     each(nodes, sweep);                        // sweep(n) for every node
@@ -91,8 +88,6 @@ void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) 
 template <class Machine>
 class SpringSolver final : public SpringEngine {
  public:
-  static constexpr int kIterations = 32;  ///< between questions whether to stop
-
   template <class... Given>
   explicit SpringSolver(const Model& model, Given&&... given)
       : machine_(std::forward<Given>(given)...), nodes_(model.nodes()) {
@@ -114,9 +109,9 @@ class SpringSolver final : public SpringEngine {
     NodeVectors<double>* const doubles[] = {&a_.u,         &a_.trial,   &a_.start, &a_.goal,       &a_.load,
                                             &a_.load_from, &a_.load_to, &a_.force, &a_.trial_force};
     for (std::size_t i = 0; i < std::size(doubles); ++i) zeros(*doubles[i], doubles_[i], Machine::kNumbersOfVector);
-    NodeVectors<float>* const floats[] = {&a_.x, &a_.r, &a_.z, &a_.p, &a_.q};
+    NodeVectors<float>* const floats[] = {&a_.x, &a_.r, &a_.z, &a_.q, &a_.p, &a_.s};
     for (std::size_t i = 0; i < std::size(floats); ++i) zeros(*floats[i], floats_[i], Machine::kNumbersOfVector);
-    zeros(a_.matrix, matrix_, LinkMatrices::kEntries * kUp);
+    zeros(a_.matrix, matrix_, KeptMatrix::kEntries * kUp);
     zeros(a_.inverse, inverse_, NodeMatrices::kEntries);
     a_.shown = hold(shown_, std::vector<glm::vec3>(nodes_, glm::vec3(0)));
     a_.state = state_.reserve(1);
@@ -181,8 +176,8 @@ class SpringSolver final : public SpringEngine {
     const GradientState state = solve_all({.kind = kind, .effort = effort}, stop);
     return {.iterations = state.iterations,
             .is_indefinite = state.is_indefinite,
-            .slope = state.direction.slope,
-            .longest_mm = std::sqrt(state.direction.most),
+            .slope = state.there.slope_before,
+            .longest_mm = std::sqrt(state.there.length),
             .there = state.there.strain()};
   }
 
@@ -226,7 +221,7 @@ class SpringSolver final : public SpringEngine {
   template <class Numbers, class T>
   void zeros(Numbers& numbers, Buffer<T>& buffer, std::size_t arrays) {
     numbers.stride = nodes_ + 2 * machine_.padding();
-    numbers.data = hold(buffer, std::vector<T>(arrays * numbers.stride, T(0))) + machine_.padding();
+    numbers.data = hold(buffer, std::vector<T>(arrays * numbers.stride)) + machine_.padding();
   }
 
   /// What SpringArrays::links holds.
@@ -244,7 +239,7 @@ class SpringSolver final : public SpringEngine {
 
   GradientState solve_all(SolveTask task, const std::stop_token& stop) {
     const auto scope = machine_.scope();
-    task.times = kIterations;
+    task.times = Machine::kIterations;
     machine_.solve(a_, task);
     GradientState state = machine_.fetch(a_.state);
     while (!state.is_done && !task.ends) {
@@ -262,7 +257,8 @@ class SpringSolver final : public SpringEngine {
   SpringArrays a_{};
   Buffer<std::int32_t> neighbour_;
   Buffer<std::uint32_t> vertex_, links_;
-  Buffer<float> stiffness_, floats_[5], matrix_, inverse_;
+  Buffer<float> stiffness_, floats_[6], inverse_;
+  Buffer<Bfloat16> matrix_;
   Buffer<SpringRole> role_;
   Buffer<double> doubles_[9], kept_;
   Buffer<glm::vec3> shown_, given_, given_forces_;

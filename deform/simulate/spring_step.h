@@ -29,22 +29,23 @@ template <class T>
 struct Stretched {
   glm::vec<3, T> along;  ///< from the node to its neighbour, mm
   T length;              ///< mm: that of `along`, or a tiny one in its place
-  T elongation;          ///< mm: length minus rest length
+  T tension;             ///< elongation over length: below 1, and negative where the spring is compressed
 
-  /// Elongation over length: below 1, and negative where the spring is compressed.
-  TETWARP_HD T tension() const { return elongation / length; }
+  /// Length minus rest length, mm.
+  TETWARP_HD T elongation() const { return tension * length; }
 };
 
 /// The spring of a link. @param apart  displacement of the neighbour minus that of the node, mm
 ///
 /// With rest vector r and e = apart, |r + e| - |r| = (2 r.e + e.e) / (|r + e| + |r|): exactly 0 where e is 0, and
-/// without the cancellation in the difference of two lengths. A spring without length pulls nowhere.
+/// without the cancellation in the difference of two lengths. A spring without length pulls nowhere. The quotient is of
+/// one, since devices compute quotients of zero, which those of springs at rest would be, in a slow way of their own.
 template <class T>
 TETWARP_HD Stretched<T> stretched(const RestLink<T>& rest, const glm::vec<3, T>& apart) {
   const T grown = 2 * dot3(rest.along, apart) + dot3(apart, apart);
   const T at_rest = rest.length * rest.length, square = at_rest + grown, least = T(1e-12) * at_rest;
   const T length = std::sqrt(square > least ? square : least);
-  return {rest.along + apart, length, grown / (length + rest.length)};
+  return {rest.along + apart, length, grown * (1 / (length * (length + rest.length)))};
 }
 
 /// What a spring does to the node at its end.
@@ -55,9 +56,9 @@ struct Pull {
 
   Pull() = default;
   TETWARP_HD Pull(const Stretched<T>& spring, T stiffness) {
-    const T pull = stiffness * spring.elongation, share = pull / spring.length;
+    const T share = stiffness * spring.tension, elongation = spring.elongation();
     force = share * spring.along;
-    energy = pull * spring.elongation;
+    energy = stiffness * (elongation * elongation);
   }
   TETWARP_HD Pull operator+(const Pull& other) const {
     Pull sum = *this;
@@ -110,13 +111,12 @@ struct SpringMatrix {
   }
 };
 
-/// Second derivative of one spring's energy, computed in double and stored in float.
-TETWARP_HD inline SpringMatrix<float> spring_matrix(const Stretched<double>& spring, double stiffness, Stiffness kind) {
-  const double even = stiffness * sideways(kind, spring.tension()), rest = stiffness - even;
+/// Second derivative of one spring's energy, computed in double.
+TETWARP_HD inline SpringMatrix<double> spring_matrix(const Stretched<double>& spring, double stiffness,
+                                                     Stiffness kind) {
+  const double even = stiffness * sideways(kind, spring.tension), rest = stiffness - even;
   const double root = std::sqrt(rest > 0 ? rest : 0) / spring.length;
-  const glm::dvec3 across = root * spring.along;
-  return {{static_cast<float>(across.x), static_cast<float>(across.y), static_cast<float>(across.z)},
-          static_cast<float>(even)};
+  return {root * spring.along, even};
 }
 
 /// Inverse of a node's sum of spring matrices, for the preconditioner. The sum is singular, or worse, where springs let

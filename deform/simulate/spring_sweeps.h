@@ -10,10 +10,13 @@
 
 namespace tetwarp::simulate {
 
-/// The sum of what a sweep returns.
-struct Sum {
-  double sum = 0;
-  TETWARP_HD void add(const Sum& other) { sum += other.sum; }
+/// The sums over free nodes of products of vectors of conjugate gradients.
+struct Products {
+  double rz = 0, zq = 0;
+  TETWARP_HD void add(const Products& other) {
+    rz += other.rz;
+    zq += other.zq;
+  }
 };
 
 namespace sweeps {
@@ -104,9 +107,9 @@ struct Carry : Sweep {
   }
 };
 
-/// Sets p to how far placed nodes have to go.
+/// Sets q to how far placed nodes have to go.
 struct PlacedMotion : Sweep {
-  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) { a.p.set(n, in_float(a.trial[n] - a.u[n])); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) { a.q.set(n, in_float(a.trial[n] - a.u[n])); }
   TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
 };
 
@@ -137,7 +140,7 @@ struct Matrices : Sweep {
       const std::int32_t to = a.other(d, n);
       if (to < 0) continue;
       const Stretched<double> spring = stretched(a.rest[d], a.u[static_cast<std::size_t>(to)] - u);
-      a.matrix.set(static_cast<std::size_t>(d - kUp), n, spring_matrix(spring, a.constant(d, n), kind));
+      a.matrix.set(static_cast<std::size_t>(d - kUp), n, KeptMatrix(spring_matrix(spring, a.constant(d, n), kind)));
     }
   }
 };
@@ -160,12 +163,12 @@ struct Inverses : Sweep {
   }
 };
 
-/// The sum over a node's links of the link's matrix times the node's vector p minus the neighbour's.
-TETWARP_HD inline glm::vec3 product(const SpringArrays& a, Stiffness kind, std::size_t n) {
-  const glm::vec3 own = a.p[n];
+/// The sum over a node's links of the link's matrix times the node's vector minus the neighbour's.
+TETWARP_HD inline glm::vec3 product(const SpringArrays& a, Stiffness kind, const NodeVectors<float>& v, std::size_t n) {
+  const glm::vec3 own = v[n];
   return with_matrices(a, kind, [&](const auto& matrix) {
     return a.sum_links<glm::vec3>(
-        n, [&](int d, std::int32_t to) { return matrix(d, n, to) * (own - a.p[static_cast<std::size_t>(to)]); });
+        n, [&](int d, std::int32_t to) { return matrix(d, n, to) * (own - v[static_cast<std::size_t>(to)]); });
   });
 }
 
@@ -174,10 +177,11 @@ struct PlacedForces : Sweep {
   Stiffness kind;
   TETWARP_HD void operator()(std::size_t n) const { at(a, kind, n); }
   TETWARP_HD static void at(const SpringArrays& a, Stiffness kind, std::size_t n) {
-    finish(a, n, a.is_free(n) ? product(a, kind, n) : glm::vec3(0));
+    finish(a, n, a.is_free(n) ? product(a, kind, a.q, n) : glm::vec3(0));
   }
-  TETWARP_HD static void finish(const SpringArrays& a, std::size_t n, const glm::vec3& q) {
-    a.r.set(n, a.is_free(n) ? -q : glm::vec3(0));
+  /// @param pull  of the node on its links
+  TETWARP_HD static void finish(const SpringArrays& a, std::size_t n, const glm::vec3& pull) {
+    a.r.set(n, a.is_free(n) ? -pull : glm::vec3(0));
   }
 };
 struct Forces : Sweep {
@@ -185,84 +189,68 @@ struct Forces : Sweep {
   TETWARP_HD static void at(const SpringArrays& a, std::size_t n) { a.r.set(n, in_float(a.force[n])); }
 };
 
-/// Sets x = 0, p = z = preconditioned r, and sums r.z.
+// Conjugate gradients with one sum an iteration (Chronopoulos and Gear 1989, "s-step iterative methods for symmetric
+// linear systems"): A is multiplied by the preconditioned residual z, not by the direction p, whose product s with A
+// follows as p does.
+
+/// Sets x = p = s = 0, and z = preconditioned r.
 struct Begin : Sweep {
-  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, n); }
-  TETWARP_HD static Sum at(const SpringArrays& a, std::size_t n) {
-    const glm::vec3 r = a.r[n], z = a.inverse[n] * r;
+  TETWARP_HD void operator()(std::size_t n) const { at(a, n); }
+  TETWARP_HD static void at(const SpringArrays& a, std::size_t n) {
     a.x.set(n, glm::vec3(0));
-    a.z.set(n, z);
-    a.p.set(n, z);
-    return {dot3(in_double(r), in_double(z))};
-  }
-};
-struct AfterBegin {
-  GradientState* state;
-  SolveEffort effort;
-  TETWARP_HD void operator()(const Sum& rz) const {
-    *state = {.effort = effort, .rz = rz.sum, .least = kFloatRounding * rz.sum, .is_done = !(rz.sum > 0)};
+    a.p.set(n, glm::vec3(0));
+    a.s.set(n, glm::vec3(0));
+    a.z.set(n, a.inverse[n] * a.r[n]);
   }
 };
 
-/// Sets q = A p, and sums the curvature p.q over free nodes. Elsewhere p is 0, and q is not used.
+/// Sets q = A z, and sums products over free nodes. Elsewhere z is 0, and q is not used.
 struct Bend : Sweep {
   Stiffness kind;
-  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, kind, n); }
-  TETWARP_HD static Sum at(const SpringArrays& a, Stiffness kind, std::size_t n) {
+  TETWARP_HD Products operator()(std::size_t n) const { return at(a, kind, n); }
+  TETWARP_HD static Products at(const SpringArrays& a, Stiffness kind, std::size_t n) {
     if (!a.is_free(n)) return {};
-    const glm::vec3 q = product(a, kind, n);
+    const glm::vec3 q = product(a, kind, a.z, n);
     a.q.set(n, q);
-    return {dot3(in_double(a.p[n]), in_double(q))};
+    const glm::dvec3 z = in_double(a.z[n]);
+    return {.rz = dot3(in_double(a.r[n]), z), .zq = dot3(z, in_double(q))};
   }
 };
+/// Finds how the next direction is made of z and the one before, and how far it is gone.
 struct AfterBend {
   GradientState* state;
-  TETWARP_HD void operator()(const Sum& curvature) const {
-    if (curvature.sum > 0) {
-      state->length = static_cast<float>(state->rz / curvature.sum);
-    } else {
-      state->is_indefinite = state->is_done = true;
-    }
-  }
-};
-
-/// Sets x += length p, r -= length q, z = preconditioned r, and sums r.z.
-struct Descend : Sweep {
-  TETWARP_HD Sum operator()(std::size_t n) const { return at(a, a.state->length, n); }
-  TETWARP_HD static Sum at(const SpringArrays& a, float length, std::size_t n) {
-    if (!a.is_free(n)) return {};
-    a.x.set(n, a.x[n] + length * a.p[n]);
-    const glm::vec3 r = a.r[n] - length * a.q[n], z = a.inverse[n] * r;
-    a.r.set(n, r);
-    a.z.set(n, z);
-    return {dot3(in_double(r), in_double(z))};
-  }
-};
-struct AfterDescend {
-  GradientState* state;
-  TETWARP_HD void operator()(const Sum& next) const {
+  TETWARP_HD void operator()(const Products& sums) const {
     GradientState& s = *state;
+    const bool is_first = s.iterations == 0;
+    const double share = is_first ? 0 : sums.rz / s.rz;
+    const double curvature = is_first ? sums.zq : sums.zq - share * sums.rz / double{s.length};  // p.s
+    if (is_first) s.least = kFloatRounding * sums.rz;
+    const bool is_left = sums.rz > s.least;
+    s.descends = is_left && curvature > 0;
+    s.is_indefinite = is_left && !s.descends;
+    s.is_done = true;
+    if (!s.descends) return;
+    s.rz = sums.rz;
+    s.share = static_cast<float>(share);
+    s.length = static_cast<float>(s.rz / curvature);
     const double gain = double{s.length} * s.rz / 2;
     s.gained += gain;
     ++s.iterations;
-    s.share = static_cast<float>(next.sum / s.rz);
-    s.rz = next.sum;
-    s.is_done = !(s.rz > s.least) || s.iterations >= s.effort.most || s.effort.is_enough(s.iterations, gain, s.gained);
+    s.is_done = s.iterations >= s.effort.most || s.effort.is_enough(s.iterations, gain, s.gained);
   }
 };
 
-/// Sets p = z + share p.
-struct NextDirection : Sweep {
-  TETWARP_HD void operator()(std::size_t n) const { at(a, a.state->share, n); }
-  TETWARP_HD static void at(const SpringArrays& a, float share, std::size_t n) { a.p.set(n, a.z[n] + share * a.p[n]); }
-};
-
-/// Sums minus the net forces times the direction, and finds the square of its longest entry.
-struct SearchDirection : Sweep {
-  TETWARP_HD Sums operator()(std::size_t n) const { return at(a, n); }
-  TETWARP_HD static Sums at(const SpringArrays& a, std::size_t n) {
-    const glm::dvec3 x = in_double(a.x[n]);
-    return {.slope = -dot3(a.force[n], x), .most = dot3(x, x)};
+/// Sets p = z + share p, s = q + share s, x += length p, r -= length s, z = preconditioned r.
+struct Descend : Sweep {
+  TETWARP_HD void operator()(std::size_t n) const { at(a, a.state->share, a.state->length, n); }
+  TETWARP_HD static void at(const SpringArrays& a, float share, float length, std::size_t n) {
+    if (!a.is_free(n)) return;
+    const glm::vec3 p = a.z[n] + share * a.p[n], s = a.q[n] + share * a.s[n], r = a.r[n] - length * s;
+    a.p.set(n, p);
+    a.s.set(n, s);
+    a.x.set(n, a.x[n] + length * p);
+    a.r.set(n, r);
+    a.z.set(n, a.inverse[n] * r);
   }
 };
 
@@ -281,7 +269,7 @@ struct Go : Sweep {
   }
 };
 
-/// Computes the strain at the trial displacement, as SpringEngine::try_step does; forces are squared.
+/// Computes the strain at the trial displacement, as SpringEngine::try_step does, and what Sums says of the direction.
 struct StrainOf : Sweep {
   TETWARP_HD Sums operator()(std::size_t n) const { return at(a, n); }
   TETWARP_HD static Sums at(const SpringArrays& a, std::size_t n) {
@@ -295,12 +283,14 @@ struct StrainOf : Sweep {
   TETWARP_HD static Sums finish(const SpringArrays& a, std::size_t n, glm::dvec3 force, double energy) {
     const glm::dvec3 load = a.load[n];
     force += load;
-    Sums sums{.sum = energy / 4 - dot3(load, a.trial[n])};
-    (a.is_free(n) ? sums.most : sums.most_placed) = a.role[n] == SpringRole::kept ? 0 : dot3(force, force);
-    sums.most_load = dot3(load, load);
-    const glm::dvec3 net = a.is_free(n) ? force : glm::dvec3(0);
+    const glm::dvec3 net = a.is_free(n) ? force : glm::dvec3(0), direction = in_double(a.x[n]);
     a.trial_force.set(n, net);
-    sums.slope = -dot3(net, in_double(a.x[n]));
+    Sums sums{.energy = energy / 4 - dot3(load, a.trial[n]),
+              .slope = -dot3(net, direction),
+              .slope_before = -dot3(a.force[n], direction)};
+    (a.is_free(n) ? sums.free_force : sums.placed_force) = a.role[n] == SpringRole::kept ? 0 : dot3(force, force);
+    sums.load = dot3(load, load);
+    sums.length = dot3(direction, direction);
     return sums;
   }
 };

@@ -411,22 +411,32 @@ std::vector<std::uint32_t> played(const Model& model, Simulation& simulation, Ra
 TEST(MassSpringSums, AreMadeInTheOrderThatIsStated) {
   constexpr double kLarge = 0x1p53;
   const auto of_block = [](std::initializer_list<std::pair<std::size_t, double>> given) {
-    Sum terms[kSumBlock];
-    for (const auto& [place, value] : given) terms[place].sum = value;
-    return tree_sum(terms).sum;
+    Products terms[kSumBlock];
+    for (const auto& [place, value] : given) terms[place].rz = value;
+    return tree_sum(terms).rz;
   };
   EXPECT_EQ(of_block({{0, kLarge}, {1, 1}, {129, 1}}), kLarge + 2);
   EXPECT_EQ(of_block({{0, kLarge}, {1, 1}, {128, 1}}), kLarge);
   EXPECT_EQ(of_block({{0, kLarge}, {2, 1}, {3, 1}}), kLarge);
   EXPECT_EQ(of_block({{0, kLarge}, {1, 1}, {3, 1}}), kLarge + 2);
   const auto of_blocks = [](std::initializer_list<std::pair<std::size_t, double>> given) {
-    std::vector<Sum> blocks(3 * kSumBlock + 5);
-    for (const auto& [place, value] : given) blocks[place].sum = value;
-    return sum_of_blocks(std::span<const Sum>(blocks)).sum;
+    std::vector<Products> blocks(3 * kSumBlock + 5);
+    for (const auto& [place, value] : given) blocks[place].rz = value;
+    return sum_of_blocks(std::span<const Products>(blocks)).rz;
   };
   EXPECT_EQ(of_blocks({{0, kLarge}, {1, 1}, {129, 1}}), kLarge + 2);
   EXPECT_EQ(of_blocks({{256, kLarge}, {512, 1}, {768, 1}}), kLarge);
   EXPECT_EQ(of_blocks({{512, kLarge}, {0, 1}, {256, 1}}), kLarge + 2);
+}
+
+TEST(MassSpringBits, OfKeptMatricesAreTheUpperHalfOfFloats) {
+  const auto kept = [](double number) { return float{Bfloat16(number)}; };
+  for (const double exact : {0.0, 1.0, -1.5, 0x1.fep100, -0x1.02p-120}) EXPECT_EQ(kept(exact), exact);
+  EXPECT_EQ(kept(1 + 0x1p-8), 1);            // ties go to the even neighbour: down,
+  EXPECT_EQ(kept(1 + 0x3p-8), 1 + 0x1p-6f);  // and up
+  EXPECT_EQ(kept(-1 - 0x1.01p-8), -1 - 0x1p-7f);
+  EXPECT_EQ(kept(1 + 0x1p-8 - 0x1p-20), 1);
+  EXPECT_EQ(kept(0x1.ffp3), 16);  // carries into the exponent
 }
 
 TEST(MassSpringBits, AreThoseOfOneNodeAfterTheOther) {
