@@ -17,7 +17,7 @@ class HostMachine {
  public:
   static constexpr Memory kMemory = Memory::host;
   static constexpr std::size_t kNumbersOfVector = 3;
-  static constexpr int kIterations = 32;
+  static constexpr int kIterations = 32;  ///< so that a request to stop is soon heard
 
   template <class T>
   class Buffer {

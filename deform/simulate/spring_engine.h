@@ -28,8 +28,10 @@ struct Strain {
 
 /// What a sweep over all nodes finds where a direction leads: sums, and the largest squares.
 struct Sums {
-  double energy = 0, slope = 0, slope_before = 0;                 ///< the second: where the direction begins
-  double free_force = 0, placed_force = 0, load = 0, length = 0;  ///< squares; the last: of the direction's vectors
+  double energy = 0, slope = 0;                       ///< see Strain
+  double slope_before = 0;                            ///< Strain::slope where the direction begins
+  double free_force = 0, placed_force = 0, load = 0;  ///< the largest squares of forces, N^2
+  double length = 0;                                  ///< the largest square of the direction's vectors, mm^2
 
   TETWARP_HD void add(const Sums& other) {
     energy += other.energy;

@@ -71,7 +71,8 @@ void solve_part(Machine& machine, const SpringArrays& a, const SolveTask& task) 
 }
 
 /// Mass-spring on a machine that runs sweeps over nodes. The same code runs on the CPU and on devices, and gives the
-/// same bits. Only sums and, now and then, the state of conjugate gradients leave the machine's memory. A machine is
+/// same bits. Only sums and, every kIterations iterations, the state of conjugate gradients leave the machine's memory.
+/// A machine is
 ///
 ///     template <class T> class Buffer;           // reserve(size), data()
 ///     kReadsLinks;                               // whether it calls sweeps that read the table of links
