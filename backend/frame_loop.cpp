@@ -178,7 +178,7 @@ class FrameLoop::Implementation {
       volume_was_read_.acquire();
       if (stop.stop_requested()) return;
       deformed_.result = frame.result;
-      deformed_.update = parts_.resampler.update({&parts_.target, 1}, control);
+      deformed_.update = parts_.resampler.update({&parts_.target, 1}, control, parts_.seen);
     } catch (...) {
       deformed_.failure = std::current_exception();
     }

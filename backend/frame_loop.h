@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "backend/backend.h"
 #include "deform/render/renderer.h"
@@ -25,7 +26,8 @@ struct ShownFrame {
 /// On a device three frames are worked on at a time: while one is drawn, the volume is deformed for the next, and the
 /// one after that is simulated. So a frame that is shown is two steps old. Volumes and pictures are those of a loop
 /// that does one after the other. Voxels that a frame does not change are not computed again
-/// (`ForwardResampler::update`). On the CPU, which all would share, one follows the other.
+/// (`ForwardResampler::update`), nor are, where that is allowed, those that no picture shows. On the CPU, which all
+/// would share, one follows the other.
 class FrameLoop {
  public:
   /// What the loop works with. All must outlive it, and nobody else may use them meanwhile.
@@ -35,6 +37,9 @@ class FrameLoop {
     Renderer& renderer;           ///< with a style
     Target target;                ///< whose output is drawn; in the memory of the backend, for pictures without copies
     Outside outside = Outside::background;  ///< what becomes of voxels outside the undeformed lattice
+    /// Where pictures are all that is wanted: the values that they show (`seen_values`). Then voxels of which nothing
+    /// is seen may stay as they are (`ForwardResampler::update`). Empty: the volume of each frame is whole.
+    std::vector<ValueRange> seen = {};
   };
 
   /// @param parts    what the loop works with

@@ -40,8 +40,8 @@ class LatticeOrMesh final : public ForwardResampler {
                   const PartSink& finished) override {
     return held().resample(region, targets, maps, control, finished);
   }
-  Update update(std::span<const Target> targets, const Control& control) override {
-    return held().update(targets, control);
+  Update update(std::span<const Target> targets, const Control& control, std::span<const ValueRange> seen) override {
+    return held().update(targets, control, seen);
   }
 
  private:

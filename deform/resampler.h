@@ -180,9 +180,15 @@ class Resampler {
   Geometry output_;
 };
 
+/// Values from `low` to `high`, both included.
+struct ValueRange {
+  float low = 0,  ///< first value of the range
+      high = 0;   ///< last value of the range
+};
+
 /// What `ForwardResampler::update` did.
 struct Update {
-  Report report;                ///< of the whole targets
+  Report report;  ///< of the whole targets; of voxels that were left, as they were when they were computed
   std::vector<Region> changed;  ///< regions of the output outside which nothing was written
 };
 
@@ -200,9 +206,16 @@ class ForwardResampler : public Resampler {
   /// Computes whole targets, as `resample` does, where their outputs hold what the last call of this function gave for
   /// the field before, and nobody has changed sources or outputs since. So the first call computes all voxels, and the
   /// next ones only those that the new field may change: frames of an animation. Other targets than those of the last
-  /// call, and backends that keep no track, mean all voxels again.
+  /// call, and backends that keep no track, mean all voxels again. For pictures, voxels may also be left as they are
+  /// where nothing is seen: no value of `seen` lies between the least and the largest of all values within three voxels
+  /// of them, along each axis, neither before nor now. The picture is that of the whole volume, and the volume is not.
+  /// They are computed as soon as they may be seen, or by a call that leaves none.
+  /// @param targets  volumes that go through the field
+  /// @param control  stop and stream
+  /// @param seen     values of which a picture shows something (`seen_values`), rising; empty: no voxel is left
   /// @throws InputError and others, as `resample`
-  virtual Update update(std::span<const Target> targets, const Control& control = {}) {
+  virtual Update update(std::span<const Target> targets, const Control& control = {},
+                        [[maybe_unused]] std::span<const ValueRange> seen = {}) {
     return {resample(whole(output()), targets, {}, control), {whole(output())}};
   }
 

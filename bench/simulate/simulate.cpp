@@ -31,12 +31,13 @@ FrameVolumes make_host_volumes(const Volume<std::int16_t>& source, double backgr
 class FramePictures {
  public:
   FramePictures(const Options& options, const Geometry& volume, bool on_cuda)
-      : camera_{.width = options.render[0], .height = options.render[1]},
+      : style_{.transfer = transfer_function(options.transfer)},
+        camera_{.width = options.render[0], .height = options.render[1]},
         volume_(volume),
         renderer_(make_renderer(on_cuda ? BackendKind::cuda : BackendKind::cpu, options.device,
                                 {.threads = options.threads})),
         rgb_(3 * static_cast<std::size_t>(camera_.width) * static_cast<std::size_t>(camera_.height)) {
-    renderer_->set_style({.transfer = transfer_function(options.transfer)});
+    renderer_->set_style(style_);
   }
 
   void draw(const ConstVolumeView& volume) {
@@ -55,8 +56,10 @@ class FramePictures {
 
   Renderer& renderer() { return *renderer_; }
   ViewPlane plane() const { return view_plane(camera_, volume_); }
+  std::vector<ValueRange> seen() const { return seen_values(style_); }
 
  private:
+  const RenderStyle style_;
   Camera camera_;
   const Geometry& volume_;
   std::unique_ptr<Renderer> renderer_;
@@ -143,10 +146,11 @@ class Measure {
   }
 
  private:
-  /// Frames a second of a FrameLoop.
+  /// Frames a second of a FrameLoop, of which nothing but pictures is wanted.
   double loop(ForwardResampler& resampler, const Target& target, FramePictures& pictures) {
     ScenarioRun run(scenario_, patient_, factory());
-    FrameLoop frames({run, resampler, pictures.renderer(), target}, backend(), options_.device);
+    FrameLoop frames({run, resampler, pictures.renderer(), target, Outside::background, pictures.seen()}, backend(),
+                     options_.device);
     for (int n = 0; n < options_.warmup; ++n) frames.next(pictures.plane());
     const Stopwatch watch;
     while (!frames.is_done()) frames.next(pictures.plane());

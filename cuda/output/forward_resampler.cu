@@ -135,19 +135,23 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
                   const PartSink& finished) override {
     updated_.clear();
     reuse_ = Reuse::nothing;
+    seen_.reset();
     if (ready_)
       require_numbers(
           maps, static_cast<std::uint64_t>(kTetrahedraPerCell * frame_.cells.x * frame_.cells.y * frame_.cells.z));
     return CudaResampler::resample(region, targets, maps, control, finished);
   }
 
-  Update update(std::span<const Target> targets, const Control& control) override {
+  Update update(std::span<const Target> targets, const Control& control, std::span<const ValueRange> seen) override {
     std::vector<UpdatedTarget> given(targets.begin(), targets.end());
     const bool stays_here = std::all_of(targets.begin(), targets.end(), [](const Target& target) {
       return target.output.memory == Memory::device;  // others are computed in a buffer of the resampler
     });
     const bool may_keep = ready_ && can_write_plainly() && stays_here;
     reuse_ = !may_keep ? Reuse::nothing : given == updated_ ? Reuse::now : Reuse::later;
+    seen_.reset();
+    if (may_keep && !seen.empty() && targets.size() == 1 && is_on_grid_here(targets[0].source))
+      seen_ = {targets[0].source, static_cast<float>(targets[0].background), {seen.begin(), seen.end()}};
     updated_.clear();
     changed_ = {whole(output())};
     const Report report = CudaResampler::resample(whole(output()), targets, {}, control, {});
@@ -156,6 +160,10 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
   }
 
  private:
+  /// Whether a source lies whole on the device, on the grid of the output.
+  bool is_on_grid_here(const ConstVolumeView& source) const {
+    return source.memory == Memory::device && *source.geometry == output() && source.buffered == whole(output());
+  }
   Slices all_cells() const { return {0, frame_.cells.z}; }
   std::uint64_t slice_vertices() const {
     return static_cast<std::uint64_t>((frame_.cells.x + 1) * (frame_.cells.y + 1));
@@ -329,7 +337,9 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
     const auto run = [&](const auto& sink) {
-      const Gather::Counters found = gather_.run(*lattice_, box, sink, stream_, reuse_);
+      const bool is_whole = box.count() == voxel_count(output());
+      const Gather::Counters found =
+          gather_.run(*lattice_, box, sink, stream_, {reuse_, seen_ && is_whole ? &*seen_ : nullptr});
       if (reuse_ == Reuse::now && gather_.changed()) changed_ = *gather_.changed();  // then the box is all there is
       plainly_covered_ += found.covered;
       plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - found.covered;
@@ -399,6 +409,7 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
   Gather gather_;
   Claims claims_;
   Reuse reuse_ = Reuse::nothing;        ///< of the call
+  std::optional<SeenSource> seen_;      ///< of the call, where what is not seen may be left
   std::vector<UpdatedTarget> updated_;  ///< what the last call updated; empty if that was none
   std::vector<Region> changed_;         ///< by `update`
 };

@@ -113,7 +113,7 @@ __global__ void write_claimed_kernel(GatherTask task, glm::ivec3 begin, const un
 
 template <class Sink>
 Gather::Counters Gather::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
-                             Reuse reuse) {
+                             const TileReuse& reuse) {
   const DeviceField& field = lattice.field();
   if constexpr (kIsCoarse<Sink>) {
     if (IntervalRaster::suits(field.steps, box, is_mostly_folded(lattice)))
@@ -174,7 +174,7 @@ bool Gather::can_find_owners(const LatticeOnDevice& lattice, const SlabBox& box)
 /// Tiles that too many tetrahedra reach are claimed.
 template <class Sink>
 Gather::Counters Gather::run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                                       cudaStream_t stream, Reuse reuse) {
+                                       cudaStream_t stream, const TileReuse& reuse) {
   const TileCounters settled = intervals_.run(lattice, box, sink, stream, reuse);
   if (settled.left == 0) return {settled.covered, 0, 0, 0};
   coverage_.forget(box, stream);
@@ -241,12 +241,13 @@ void Gather::claim_several(const Task& task, const DeviceField& field, const Sin
   }
 }
 
-#define TETWARP_RUN(...) \
-  template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t, Reuse)
+#define TETWARP_RUN(...)                                                                                          \
+  template Gather::Counters Gather::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t, \
+                                        const TileReuse&)
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::separate);
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 #undef TETWARP_RUN
 template Gather::Counters Gather::run_intervals(const LatticeOnDevice&, const SlabBox&, const OwnerSink&, cudaStream_t,
-                                                Reuse);
+                                                const TileReuse&);
 
 }  // namespace tetwarp::cuda_detail

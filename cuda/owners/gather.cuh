@@ -103,13 +103,13 @@ class Gather {
   /// Finds the voxels of `box`; waits for the stream.
   template <class Sink>
   Counters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
-               Reuse reuse = Reuse::nothing);
+               const TileReuse& reuse = {});
 
   /// Whether `find_owners` serves a box: coarse lattices with large cells.
   static bool can_find_owners(const LatticeOnDevice& lattice, const SlabBox& box);
   /// Finds the numbers of the owners of all voxels of `box`; waits for the stream.
   Counters find_owners(const LatticeOnDevice& lattice, const SlabBox& box, const OwnerSink& sink, cudaStream_t stream) {
-    return run_intervals(lattice, box, sink, stream, Reuse::nothing);
+    return run_intervals(lattice, box, sink, stream, {});
   }
 
   /// With Reuse::now: outside which regions the last run gave the sink nothing; none where it gave it all.
@@ -135,7 +135,7 @@ class Gather {
   /// The way for large cells.
   template <class Sink>
   Counters run_intervals(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
-                         Reuse reuse);
+                         const TileReuse& reuse);
   /// Claims the voxels that the coverage calls `several`.
   template <class Task, class Sink>
   void claim_several(const Task& task, const DeviceField& field, const Sink& sink, cudaStream_t stream);

@@ -63,17 +63,28 @@ struct LatticeShape {
 struct TileRange {
   glm::ivec3 first{0}, last{-1};
 
-  /// @param box  of a record
+  /// @param box  of a record  @param around  voxels by which it is larger on all sides
   template <class Shape>
-  __device__ TileRange(const TileTask<Shape>& task, const int4& box) {
+  __device__ TileRange(const TileTask<Shape>& task, const int4& box, int around = 0) {
     const glm::ivec3 words(box.x, box.y, box.z), extent(kTileI, kTileJ, Shape::kDepth);
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
-      const int begin = max(VoxelRange::from(VoxelRange::low(words[axis]), 1), task.box.begin[axis]),
-                end = min(VoxelRange::from(VoxelRange::high(words[axis]), -1), task.box.end[axis]) - 1;
+      const int begin = max(VoxelRange::from(VoxelRange::low(words[axis]), 1) - around, task.box.begin[axis]),
+                end = min(VoxelRange::from(VoxelRange::high(words[axis]), -1) + around, task.box.end[axis]) - 1;
       any = any && begin <= end;
       first[axis] = (begin - task.origin[axis]) / extent[axis];
       last[axis] = (end - task.origin[axis]) / extent[axis];
+    }
+  }
+
+  /// Calls `use` with the number of each.
+  template <class Shape, class Use>
+  __device__ void for_each(const TileTask<Shape>& task, Use&& use) const {
+    if (!any) return;
+    for (glm::ivec3 at = first; at.z <= last.z; ++at.z) {
+      for (at.y = first.y; at.y <= last.y; ++at.y) {
+        for (at.x = first.x; at.x <= last.x; ++at.x) use(task.tile_number(at));
+      }
     }
   }
 
@@ -116,6 +127,44 @@ __global__ void __launch_bounds__(kThreads) list_kernel(const __grid_constant__ 
   }
 }
 
+/// Voxels around a tile whose values may show in a picture that shows its own: samples of a ray are at most a voxel
+/// apart, and their values and light come from voxels less than two away.
+constexpr int kSeenAround = 3;
+
+/// Adds what a tetrahedron brings to the tiles in or near which it may own voxels.
+template <class Shape>
+__device__ void add_content(const TileTask<Shape>& task, std::int64_t n) {
+  const ValueHull brought = task.kept.cells[n / kTetrahedraPerCell];
+  TileRange(task, task.records.box(n), kSeenAround).for_each(task, [&](int tile) {
+    task.kept.add_content(tile, brought);
+  });
+}
+
+/// What all tiles contain: a thread a tetrahedron. @param task  with what nobody brings in `kept.content`: added to
+template <class Shape>
+__global__ void __launch_bounds__(kThreads) content_kernel(const __grid_constant__ TileTask<Shape> task) {
+  const std::int64_t n = thread_of_grid();
+  if (n < task.records.count) add_content(task, n);
+}
+
+/// Decides which tiles are made: those that have changed since they were, unless nothing is seen there. A thread a
+/// tile.
+///
+/// @param kept     `covered` becomes 0 where a tile is made  @param tiles  how many  @param seen  without content: not
+///                 asked
+/// @param changed  whether a tile has changed now; becomes whether it is made
+/// @param stale    whether it has changed before, and was left: becomes whether it is left
+__global__ void __launch_bounds__(kThreads)
+    choose_kernel(KeptTiles kept, int tiles, SeenHulls seen, std::uint8_t* changed, std::uint8_t* stale) {
+  const auto n = static_cast<int>(thread_of_grid());
+  if (n >= tiles) return;
+  const bool differs = changed[n] != 0 || stale[n] != 0,
+             is_made = differs && (!kept.content || seen.meet(kept.content[n]));
+  changed[n] = is_made ? 1 : 0;
+  stale[n] = differs && !is_made ? 1 : 0;
+  if (is_made) kept.covered[n] = 0;
+}
+
 /// The vertices of the field before, as StepLattice has them.
 struct VerticesBefore {
   const std::uint64_t* packed;
@@ -125,7 +174,7 @@ struct VerticesBefore {
 /// Makes anew the records of tetrahedra of which a vertex has moved, and tells which tiles these reach now or reached
 /// before: a thread a tetrahedron.
 ///
-/// @param task     its records are those of the field before, and become those of this one
+/// @param task     its records are those of the field before, and become those of this one; what they bring is added
 /// @param changed  of each tile: 0 before, set to 1
 template <class Shape>
 __global__ void __launch_bounds__(kThreads)
@@ -140,22 +189,11 @@ __global__ void __launch_bounds__(kThreads)
     moved |= lattice.moved(at) != before.packing.unpacked(before.packed[at]);
   }
   if (!moved) return;
-  const auto mark = [&] {
-    const TileRange range(task, task.records.box(n));
-    if (!range.any) return;
-    for (glm::ivec3 at = range.first; at.z <= range.last.z; ++at.z) {
-      for (at.y = range.first.y; at.y <= range.last.y; ++at.y) {
-        for (at.x = range.first.x; at.x <= range.last.x; ++at.x) {
-          const int tile = task.tile_number(at);
-          changed[tile] = 1;
-          task.kept.covered[tile] = 0;
-        }
-      }
-    }
-  };
+  const auto mark = [&] { TileRange(task, task.records.box(n)).for_each(task, [&](int tile) { changed[tile] = 1; }); };
   mark();
   put_record(task.records, n, vertices_of(lattice, t));
   mark();
+  if (task.kept.content) add_content(task, n);
 }
 
 }  // namespace

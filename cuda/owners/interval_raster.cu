@@ -128,25 +128,44 @@ void IntervalRaster::keep(int depth, const StepLattice& lattice, const SlabBox& 
 
 template <int kDepth, class Sink>
 TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                                       cudaStream_t stream, Reuse reuse) {
+                                       cudaStream_t stream, const TileReuse& wanted) {
+  const auto [reuse, seen] = wanted;
   auto task = make_task<kDepth>(lattice, box);
   Tiles& held = kDepth == kTileK ? deep_ : flat_;
   const auto tiles = static_cast<std::size_t>(count_of(task.tiles));
   const StepLattice& steps = lattice.field().steps;
-  const bool only_changed = reuse == Reuse::now && !has_records_ && has_kept(kDepth, steps, box);
+  const bool only_changed =
+      reuse == Reuse::now && !has_records_ && has_kept(kDepth, steps, box) && (!seen || has_content_);
   kept_depth_ = 0;
   held.counts.fill(0, tiles, stream);
   counters_.fill(0, 1, stream);
+  has_content_ = seen && reuse != Reuse::nothing;
   if (reuse != Reuse::nothing) task.kept.covered = kept_covered_.reserve(tiles);
+  if (has_content_) {
+    task.kept.cells = cells_.reserve(static_cast<std::size_t>(steps.cells.x) * steps.cells.y * steps.cells.z);
+    task.kept.content = content_.reserve(tiles);
+  }
   const unsigned blocks = blocks_for(task.records.count);
   if (only_changed) {
     changed_.fill(0, tiles, stream);
     task.kept.changed = changed_.data();
     change_kernel<<<blocks, kThreads, 0, stream>>>(task, {kept_lattice_.packed, kept_lattice_.packing},
                                                    changed_.data());
+    choose_kernel<<<blocks_for(static_cast<std::int64_t>(tiles)), kThreads, 0, stream>>>(
+        task.kept, static_cast<int>(tiles), seen ? SeenHulls::of(seen->values) : SeenHulls{}, changed_.data(),
+        stale_.data());
   } else {
-    if (task.kept.covered) kept_covered_.fill(0, tiles, stream);
+    if (task.kept.covered) {
+      kept_covered_.fill(0, tiles, stream);
+      stale_.fill(0, tiles, stream);
+    }
     if (!has_records_) record_kernel<<<blocks, kThreads, 0, stream>>>(task.shape, task.records);
+    if (has_content_) {
+      find_content(steps, *seen, cells_.data(), stream);
+      const std::vector<ValueHull> nobody(tiles, ValueHull::of(seen->background, seen->background));
+      content_.upload(nobody.data(), tiles, stream);
+      content_kernel<<<blocks, kThreads, 0, stream>>>(task);
+    }
   }
   has_records_ = true;
   list_kernel<<<blocks, kThreads, 0, stream>>>(task);
@@ -172,16 +191,15 @@ TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const Sla
 
 template <class Sink>
 TileCounters IntervalRaster::run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink,
-                                 cudaStream_t stream, Reuse reuse) {
+                                 cudaStream_t stream, const TileReuse& reuse) {
   tried_deep_ = false;
   TileCounters found{};
   if (is_for_deep(lattice.field().steps)) {
     found = run_tiles<kTileK>(lattice, box, sink, stream, reuse);
     tried_deep_ = true;
     if (found.left == 0) return found;
-    reuse = Reuse::nothing;
   }
-  const TileCounters more = run_tiles<kFlat>(lattice, box, sink, stream, reuse);
+  const TileCounters more = run_tiles<kFlat>(lattice, box, sink, stream, tried_deep_ ? TileReuse{} : reuse);
   return {found.covered + more.covered, more.left};
 }
 
@@ -194,7 +212,7 @@ void IntervalRaster::mark_left(const LatticeOnDevice& lattice, const SlabBox& bo
 
 #define TETWARP_RUN(...)                                                                                              \
   template TileCounters IntervalRaster::run(const LatticeOnDevice&, const SlabBox&, const __VA_ARGS__&, cudaStream_t, \
-                                            Reuse)
+                                            const TileReuse&)
 TETWARP_FOR_EACH_SINK(TETWARP_RUN, Lerp::fused);
 TETWARP_RUN(OwnerSink);
 #undef TETWARP_RUN

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cuda/lattice/slab.cuh"
+#include "cuda/owners/tile_content.cuh"
 
 namespace tetwarp::cuda_detail {
 
@@ -41,6 +42,12 @@ enum class Reuse : std::uint8_t {
   now       ///< the sink has what the run before gave it: only tiles that changed are made, if that run kept them
 };
 
+/// As `Reuse`, and what of the values in the sink is seen.
+struct TileReuse {
+  Reuse reuse = Reuse::nothing;
+  const SeenSource* seen = nullptr;  ///< with Reuse::now, tiles in which nothing is seen are left; null: none is
+};
+
 /// The way for coarse lattices with large cells at whole steps. Once a field each tetrahedron gets a record: where its
 /// faces cross rows (deform/core/row_lines.h), and its map. Tile by tile, those that may reach a tile mark an interval
 /// in each row, and the lowest number wins. Nothing need be known of folds or of the border.
@@ -53,7 +60,7 @@ class IntervalRaster {
   /// Finds the voxels of `box`, save for tiles that are left. Waits for the stream.
   template <class Sink>
   TileCounters run(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
-                   Reuse reuse = Reuse::nothing);
+                   const TileReuse& reuse = {});
   /// Sets the bits of the voxels of tiles that were left. @param several  of the box of the last run, rows from a word
   /// on
   void mark_left(const LatticeOnDevice& lattice, const SlabBox& box, std::uint32_t* several, cudaStream_t stream);
@@ -80,7 +87,7 @@ class IntervalRaster {
   /// One pass over the tiles of one depth; of those without room at twice the depth, if that was tried.
   template <int kDepth, class Sink>
   TileCounters run_tiles(const LatticeOnDevice& lattice, const SlabBox& box, const Sink& sink, cudaStream_t stream,
-                         Reuse reuse);
+                         const TileReuse& reuse);
   /// Whether the last run kept all tiles, of this depth, of such a lattice and box.
   bool has_kept(int depth, const StepLattice& lattice, const SlabBox& box) const;
   void keep(int depth, const StepLattice& lattice, const SlabBox& box, cudaStream_t stream);
@@ -95,8 +102,11 @@ class IntervalRaster {
   StepLattice kept_lattice_;  ///< that these are of; its vertices are those of `kept_vertices_`
   SlabBox kept_box_{};
   DeviceBuffer<std::uint64_t> kept_vertices_;
-  DeviceBuffer<unsigned> kept_covered_;  ///< voxels that each tile covered
-  DeviceBuffer<std::uint8_t> changed_;   ///< whether each tile has changed
+  DeviceBuffer<unsigned> kept_covered_;      ///< voxels that each tile covered
+  DeviceBuffer<std::uint8_t> changed_;       ///< whether each tile has changed and is made
+  DeviceBuffer<std::uint8_t> stale_;         ///< whether each tile has changed since it was made
+  bool has_content_ = false;                 ///< whether `content_` is known since all tiles were made
+  DeviceBuffer<ValueHull> cells_, content_;  ///< `KeptTiles`
   PinnedBuffer<std::uint8_t> changed_on_host_;
   std::optional<std::vector<Region>> made_;
 };

@@ -30,7 +30,15 @@ struct TileList {
 struct KeptTiles {
   const std::uint8_t* changed;  ///< whether a tile must be made again; null: all must
   unsigned* covered;            ///< voxels that a tile covered, 0 before it is made again; null: not wanted
+  const ValueHull* cells;       ///< values that each cell of the lattice brings
+  ValueHull* content;           ///< values in and around each tile since all were made; null: not wanted
 
+  /// Adds what a cell brings.
+  __device__ void add_content(int tile, const ValueHull& hull) const {
+    ValueHull& held = content[tile];  // others only widen it, so mostly a look is enough
+    if (hull.least < held.least) atomicMin(&held.least, hull.least);
+    if (hull.most > held.most) atomicMax(&held.most, hull.most);
+  }
   __device__ bool is_wanted(int tile) const { return !changed || changed[tile] != 0; }
 };
 

@@ -147,6 +147,28 @@ ClearValues clear_values(const std::vector<TransferEntry>& table, const RayFrame
   return clear;
 }
 
+std::vector<ValueRange> seen_values(const RenderStyle& style) {
+  require_valid(style);
+  constexpr float kEnd = std::numeric_limits<float>::infinity();
+  const TransferFunction& transfer = style.transfer;
+  const double low = transfer.points.front().value, high = transfer.points.back().value;
+  if (transfer.projection == Projection::maximum) return {{static_cast<float>(low), kEnd}};
+  // An entry is that of values up to half an entry away; a whole one leaves room for rounding errors.
+  const auto value = [&](int entry) {
+    return static_cast<float>(mixed(low, high, static_cast<double>(entry) / (kTransferEntries - 1)));
+  };
+  const std::vector<TransferEntry> table = transfer_table(transfer, 1);
+  const auto is_seen = [&](int entry) { return table[static_cast<std::size_t>(entry)].opacity > 0; };
+  std::vector<ValueRange> seen;
+  for (int entry = 0; entry < kTransferEntries; ++entry) {
+    if (!is_seen(entry)) continue;
+    const int first = entry;
+    while (entry + 1 < kTransferEntries && is_seen(entry + 1)) ++entry;
+    seen.push_back({first == 0 ? -kEnd : value(first - 1), entry + 1 == kTransferEntries ? kEnd : value(entry + 1)});
+  }
+  return seen;
+}
+
 std::vector<TransferEntry> transfer_table(const TransferFunction& transfer, double step_mm) {
   const double low = transfer.points.front().value, high = transfer.points.back().value;
   std::vector<TransferEntry> table;

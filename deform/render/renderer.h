@@ -32,6 +32,11 @@ struct Tints {
   std::vector<glm::vec4> colours = {};
 };
 
+/// The values of which pictures in this style show something, rising, so that what a picture shows depends on no part
+/// of a volume in which none of them lies between the least and the largest value. For `ForwardResampler::update`.
+/// @throws InputError for a style with a number out of its range
+std::vector<ValueRange> seen_values(const RenderStyle& style);
+
 /// Casts parallel rays through a volume. It makes one picture after another, of one volume after another.
 ///
 /// A picture depends on volume, style and plane alone: it has the same bytes on every backend, for any number of

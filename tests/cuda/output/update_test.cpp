@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <optional>
 
 #include "backend/devices.h"
@@ -33,7 +34,7 @@ class Updates : public testing::Test {
     device_ = make_forward_resampler(BackendKind::cuda, grid_);
     cpu_ = make_cpu_resampler(grid_);
     renderer_ = make_renderer(BackendKind::cuda);
-    renderer_->set_style({.transfer = transfer_function("ct-bone")});
+    renderer_->set_style(style_);
   }
 
   Target target_there(double background = -7) {
@@ -41,10 +42,10 @@ class Updates : public testing::Test {
             .output = on_device(view(held_), output_there_->data()),
             .background = background};
   }
-  Report update(const VertexField& field, double background = -7) {
+  Report update(const VertexField& field, double background = -7, const std::vector<ValueRange>& seen = {}) {
     device_->set_field(view(field, Outside::background));
     const Target target = target_there(background);
-    Update update = device_->update({&target, 1});
+    Update update = device_->update({&target, 1}, {}, seen);
     changed_ = std::move(update.changed);
     return update.report;
   }
@@ -58,23 +59,33 @@ class Updates : public testing::Test {
     EXPECT_EQ(report.uncovered, found.uncovered);
     EXPECT_EQ(report.inverted, found.inverted);
   }
+  std::vector<std::int16_t> whole_pass(const VertexField& field, double background) {
+    auto expected = poisoned<std::int16_t>(grid_);
+    const Target target{.source = view(source_), .output = view(expected), .background = background};
+    cpu_->set_field(view(field, Outside::background));
+    cpu_->resample(whole(grid_), {&target, 1});
+    return expected.voxels;
+  }
   /// The picture of what the device holds, by a renderer that was told of each change, and of what it should hold.
-  void expect_picture(bool is_first) {
-    const std::vector<std::int16_t> there = output_there_->download();
-    const Volume<std::int16_t> expected{grid_, there};
-    const ViewPlane plane = view_plane({.angle_deg = 40, .width = 60, .height = 50}, grid_);
-    std::vector<std::uint8_t> found(3 * 60 * 50), wanted(found.size());
+  void expect_picture(bool is_first) { expect_picture(is_first, output_there_->download()); }
+  /// The same. @param voxels  of which it should be the picture
+  void expect_picture(bool is_first, const std::vector<std::int16_t>& voxels) {
+    const Volume<std::int16_t> expected{grid_, voxels};
     if (is_first) {
-      renderer_->set_volume(on_device(view(expected), output_there_->data()));
+      renderer_->set_volume(on_device(view(held_), output_there_->data()));
     } else {
       renderer_->update_volume(changed_);
     }
-    renderer_->render(plane, found);
     const auto on_cpu = make_cpu_renderer();
-    on_cpu->set_style({.transfer = transfer_function("ct-bone")});
+    on_cpu->set_style(style_);
     on_cpu->set_volume(view(expected));
-    on_cpu->render(plane, wanted);
-    EXPECT_EQ(found, wanted);
+    for (const double angle : {40.0, 220.0}) {
+      const ViewPlane plane = view_plane({.angle_deg = angle, .width = kWidth, .height = kHeight}, grid_);
+      std::vector<std::uint8_t> found(3 * kWidth * kHeight), wanted(found.size());
+      renderer_->render(plane, found);
+      on_cpu->render(plane, wanted);
+      EXPECT_EQ(found, wanted);
+    }
   }
   /// Moves some vertices.
   void move_some(VertexField& field, double share, double mm) {
@@ -84,11 +95,14 @@ class Updates : public testing::Test {
     }
   }
 
+  static constexpr int kWidth = 120, kHeight = 100;  ///< pixels
+
   const Geometry grid_ = unit_grid({91, 70, 58});
   Random random_{test_seed(), 77};
   Volume<std::int16_t> source_{grid_, {}}, held_ = poisoned<std::int16_t>(grid_);
   std::optional<OnDevice<std::int16_t>> source_there_, output_there_;
   std::unique_ptr<ForwardResampler> device_, cpu_;
+  RenderStyle style_{.transfer = transfer_function("ct-bone")};
   std::unique_ptr<Renderer> renderer_;
   std::vector<Region> changed_;  ///< by the last update
 };
@@ -135,6 +149,150 @@ TEST_F(Updates, WriteOnlyWhatMayChange) {
   EXPECT_LE(std::count_if(found.begin(), found.end(), [](std::int16_t voxel) { return voxel != 99; }), within);
   EXPECT_GT(std::count(found.begin(), found.end(), 99), std::ptrdiff_t(found.size() * 8 / 10));
   EXPECT_NEAR(static_cast<double>(report.covered), static_cast<double>(covered), 200);
+}
+
+/// A source of tissue with some bones and some air, all with noise.
+class SeenUpdates : public Updates {
+ protected:
+  void SetUp() override {
+    Updates::SetUp();
+    if (IsSkipped()) return;
+    struct Ball {
+      glm::dvec3 centre;
+      double radius, value;
+    };
+    std::vector<Ball> balls;
+    for (int n = 0; n < 6; ++n) {
+      balls.push_back({{random_.real(0, 91), random_.real(0, 70), random_.real(0, 58)},
+                       random_.real(2, 12),
+                       n < 3 ? 700.0 : -800.0});
+    }
+    make_source([&](const glm::ivec3& voxel) {
+      double value = 40;
+      for (const Ball& ball : balls)
+        if (glm::distance(glm::dvec3(voxel), ball.centre) < ball.radius) value = ball.value;
+      return value;
+    });
+  }
+  /// @param value  of a voxel, to which noise is added
+  template <class Value>
+  void make_source(Value&& value) {
+    std::size_t n = 0;
+    for (int z = 0; z < 58; ++z) {
+      for (int y = 0; y < 70; ++y) {
+        for (int x = 0; x < 91; ++x)
+          source_.voxels[n++] = static_cast<std::int16_t>(value(glm::ivec3(x, y, z)) + random_.real(-100, 100));
+      }
+    }
+    source_there_.emplace(source_.voxels);
+  }
+  std::int64_t voxels_changed() const {
+    std::int64_t within = 0;
+    for (const Region& region : changed_) within += voxel_count(region);
+    return within;
+  }
+};
+
+TEST_F(SeenUpdates, ShowThePictureOfTheWholeVolume) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  std::size_t differing = 0;
+  for (const char* const name : {"ct-bone", "ct-lung", "ct-vessel", "mip", "xray"}) {
+    SCOPED_TRACE(name);
+    style_.transfer = transfer_function(name);
+    renderer_->set_style(style_);
+    const std::vector<ValueRange> seen = seen_values(style_);
+    for (const double background : {-1000.0, 900.0}) {
+      for (const std::int64_t cell : {8, 16}) {
+        SCOPED_TRACE("cells of " + std::to_string(cell) + ", background " + std::to_string(background));
+        VertexField field =
+            sample_on(lattice_over(grid_, cell), Bubble{.radius = 25, .strength = 0.3, .centre = {40, 35, 30}});
+        device_ = make_forward_resampler(BackendKind::cuda, grid_);
+        update(field, background, seen);
+        expect_picture(true, whole_pass(field, background));
+        for (const double share : {0.01, 0.1, 1.0, 0.01, 0.3, 0.02}) {
+          move_some(field, share, 0.3 * static_cast<double>(cell));
+          if (random_.chance(0.5)) {  // so that what is seen comes to other tiles
+            for (glm::vec3& moved : field.displacement) moved += glm::vec3(6, 3, -4);
+          }
+          update(field, background, seen);
+          const std::vector<std::int16_t> expected = whole_pass(field, background), found = output_there_->download();
+          for (std::size_t n = 0; n < found.size(); ++n) differing += found[n] != expected[n] ? 1 : 0;
+          expect_picture(false, expected);
+        }
+        expect_whole_pass(field, update(field, background), background);  // what was left is made
+      }
+    }
+  }
+  EXPECT_GT(differing, 0u) << "nothing was ever left";
+}
+
+/// A bone that goes through tiles in which nothing was seen before.
+TEST_F(SeenUpdates, FollowWhatIsSeenIntoOtherTiles) {
+  make_source([](const glm::ivec3& voxel) {
+    return glm::distance(glm::dvec3(voxel), glm::dvec3(12, 35, 29)) < 6 ? 700.0 : 40.0;
+  });
+  VertexField field = uniform_field(lattice_over(grid_, 8), glm::vec3(0));
+  for (int frame = 0; frame < 16; ++frame) {
+    SCOPED_TRACE(frame);
+    update(field, -1000, seen_values(style_));
+    expect_picture(frame == 0, whole_pass(field, -1000));
+    for (glm::vec3& moved : field.displacement) moved += glm::vec3(4, 0, 0);
+  }
+}
+
+/// A bone up to the border of a tile. In the tile behind it there is tissue from far away, since the cells between are
+/// pressed flat; when that moves, the bone's surface looks different.
+TEST_F(SeenUpdates, MakeWhatLiesBesideWhatIsSeen) {
+  constexpr int kCell = 16;
+  VertexField field = uniform_field(lattice_over(grid_, kCell), glm::vec3(0));
+  update(field);
+  field.displacement.front().x = 0.5f;
+  update(field);
+  ASSERT_FALSE(changed_.empty());
+  const auto border = static_cast<int>(changed_.front().end.x), vertex = (border + kCell / 2) / kCell;
+  ASSERT_GT(vertex, 0);
+  make_source([&](const glm::ivec3& voxel) {
+    return voxel.x >= vertex * kCell - 12 && voxel.x < vertex * kCell ? 700.0 : 40.0;
+  });
+  const auto vertices_at = [&](int x, const auto& use) {
+    for (std::size_t n = 0; n < field.displacement.size(); ++n)
+      if (static_cast<std::int64_t>(n) % field.lattice.size.x == x) use(field.displacement[n]);
+  };
+  const auto place = [&](int x, double at) {
+    vertices_at(x, [&](glm::vec3& moved) { moved.x = static_cast<float>(at - x * kCell); });
+  };
+  place(0, 0);
+  place(vertex, border - 0.6);
+  place(vertex + 1, border - 0.1);
+  for (int frame = 0; frame < 5; ++frame) {
+    SCOPED_TRACE(frame);
+    update(field, -1000, seen_values(style_));
+    expect_picture(frame == 0, whole_pass(field, -1000));
+    vertices_at(vertex + 2, [](glm::vec3& moved) { moved.y += 3; });
+  }
+}
+
+TEST_F(SeenUpdates, MakeWhatWasLeftWhenItMayBeSeen) {
+  style_.transfer = transfer_function("ct-bone");
+  const std::vector<ValueRange> bone = seen_values(style_), lung{{-900, -700}};
+  std::fill(source_.voxels.begin(), source_.voxels.end(), std::int16_t{40});
+  source_there_.emplace(source_.voxels);
+  VertexField field = uniform_field(lattice_over(grid_, 8), glm::vec3(0));
+  update(field, 0, bone);
+  move_some(field, 1, 2);
+  const Report left = update(field, 0, bone);
+  EXPECT_TRUE(changed_.empty());
+  EXPECT_EQ(left.covered, static_cast<std::uint64_t>(voxel_count(grid_)));
+  update(field, 0, lung);
+  EXPECT_TRUE(changed_.empty());
+  update(field, 0, {{30, 50}});  // the field is that of before, but tiles of it were left
+  EXPECT_EQ(voxels_changed(), voxel_count(grid_));
+  EXPECT_EQ(output_there_->download(), whole_pass(field, 0));
+  move_some(field, 1, 2);
+  expect_whole_pass(field, update(field, 0), 0);
+  move_some(field, 1, 2);
+  update(field, 0, bone);  // what tiles contain is not known since the call before, so all are made
+  EXPECT_EQ(changed_, std::vector<Region>{whole(grid_)});
 }
 
 TEST_F(Updates, ClearWhatTissueHasLeft) {

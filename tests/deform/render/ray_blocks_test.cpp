@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "deform/render/ray_frame.h"
 #include "tests/support/fields.h"
 
 namespace tetwarp {
@@ -37,6 +38,49 @@ TEST(RayBlocks, RowsOfRegionsAreThoseThatReachThem) {
       if (reaches) expected.push_back(row);
     }
     EXPECT_EQ(block_rows_of(grid, {&region, 1}), expected) << to_string(region.begin);
+  }
+}
+
+/// Whatever is seen of some values has one of `seen_values` between them; and more than an entry around what is seen
+/// there is none.
+TEST(RayBlocks, SeenValuesAreThoseOfBlocksThatAreNotEmpty) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 8101);
+  const Geometry grid = unit_grid({20, 20, 20});
+  std::vector<TransferFunction> transfers;
+  for (const std::string& name : transfer_function_names()) transfers.push_back(transfer_function(name));
+  transfers.push_back(
+      {"two bands",
+       Projection::composite,
+       {{-100, {}, 0}, {0, {}, 0}, {10, {}, 0.5}, {20, {}, 0}, {300, {}, 0}, {310, {}, 0.1}, {320, {}, 0}}});
+  transfers.push_back({"ends", Projection::composite, {{-100, {}, 0.5}, {0, {}, 0}, {500, {}, 0}, {600, {}, 1}}});
+  for (const TransferFunction& transfer : transfers) {
+    SCOPED_TRACE(transfer.name);
+    const RenderStyle style{.transfer = transfer};
+    const RayFrame frame = ray_frame(grid, style, view_plane({}, grid));
+    const std::vector<int> before = opaque_before(transfer_table(transfer, 1));
+    const std::vector<ValueRange> seen = seen_values(style);
+    const double low = transfer.points.front().value, high = transfer.points.back().value,
+                 entry = (high - low) / (kTransferEntries - 1);
+    const auto meets = [&](double least, double most) {
+      return std::any_of(seen.begin(), seen.end(),
+                         [&](const ValueRange& range) { return least <= range.high && range.low <= most; });
+    };
+    int empty = 0, met = 0;
+    for (int n = 0; n < 20000; ++n) {
+      const double least = random.real(low - 300, high + 300),
+                   most = least + (random.chance(0.5) ? random.real(0, 3 * entry) : random.real(0, 400));
+      if (!is_empty({static_cast<float>(least), static_cast<float>(most)}, frame, before.data())) {
+        ASSERT_TRUE(meets(least, most)) << least << " to " << most;
+        ++met;
+      } else if (is_empty({static_cast<float>(least - 2 * entry), static_cast<float>(most + 2 * entry)}, frame,
+                          before.data())) {
+        ASSERT_FALSE(meets(least, most)) << least << " to " << most;
+        ++empty;
+      }
+    }
+    EXPECT_GT(met, 100);
+    EXPECT_GT(empty, 100);
   }
 }
 
