@@ -50,21 +50,27 @@ class Updates : public testing::Test {
     return update.report;
   }
   void expect_whole_pass(const VertexField& field, const Report& found, double background = -7) {
-    auto expected = poisoned<std::int16_t>(grid_);
-    const Target target{.source = view(source_), .output = view(expected), .background = background};
-    cpu_->set_field(view(field, Outside::background));
-    const Report report = cpu_->resample(whole(grid_), {&target, 1});
-    EXPECT_TRUE(output_there_->download() == expected.voxels);
+    Report report;
+    const std::vector<std::int16_t> expected = whole_pass(field, background, &report);
+    EXPECT_TRUE(output_there_->download() == expected);
     EXPECT_EQ(report.covered, found.covered);
     EXPECT_EQ(report.uncovered, found.uncovered);
     EXPECT_EQ(report.inverted, found.inverted);
   }
-  std::vector<std::int16_t> whole_pass(const VertexField& field, double background) {
+  /// What the CPU makes of all voxels. @param report  of it: written, unless null
+  std::vector<std::int16_t> whole_pass(const VertexField& field, double background, Report* report = nullptr) {
     auto expected = poisoned<std::int16_t>(grid_);
     const Target target{.source = view(source_), .output = view(expected), .background = background};
     cpu_->set_field(view(field, Outside::background));
-    cpu_->resample(whole(grid_), {&target, 1});
+    const Report found = cpu_->resample(whole(grid_), {&target, 1});
+    if (report) *report = found;
     return expected.voxels;
+  }
+  /// In the regions that the last update wrote.
+  std::int64_t voxels_changed() const {
+    std::int64_t within = 0;
+    for (const Region& region : changed_) within += voxel_count(region);
+    return within;
   }
   /// The picture of what the device holds, by a renderer that was told of each change, and of what it should hold.
   void expect_picture(bool is_first) { expect_picture(is_first, output_there_->download()); }
@@ -140,11 +146,7 @@ TEST_F(Updates, WriteOnlyWhatMayChange) {
   const std::vector<std::int16_t> found = output_there_->download();
   EXPECT_NE(found.front(), 99);
   EXPECT_EQ(found.back(), 99);
-  std::int64_t within = 0;
-  for (const Region& region : changed_) {
-    const glm::i64vec3 size = region.end - region.begin;
-    within += size.x * size.y * size.z;
-  }
+  const std::int64_t within = voxels_changed();
   EXPECT_GT(within, 0);
   EXPECT_LE(std::count_if(found.begin(), found.end(), [](std::int16_t voxel) { return voxel != 99; }), within);
   EXPECT_GT(std::count(found.begin(), found.end(), 99), std::ptrdiff_t(found.size() * 8 / 10));
@@ -185,11 +187,6 @@ class SeenUpdates : public Updates {
       }
     }
     source_there_.emplace(source_.voxels);
-  }
-  std::int64_t voxels_changed() const {
-    std::int64_t within = 0;
-    for (const Region& region : changed_) within += voxel_count(region);
-    return within;
   }
 };
 
