@@ -151,7 +151,7 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
     reuse_ = !may_keep ? Reuse::nothing : given == updated_ ? Reuse::now : Reuse::later;
     seen_.reset();
     if (may_keep && !seen.empty() && targets.size() == 1 && is_on_grid_here(targets[0].source))
-      seen_ = {targets[0].source, static_cast<float>(targets[0].background), {seen.begin(), seen.end()}};
+      seen_ = {targets[0].source, targets[0].background, seen};
     updated_.clear();
     changed_ = {whole(output())};
     const Report report = CudaResampler::resample(whole(output()), targets, {}, control, {});
@@ -337,9 +337,7 @@ class LatticeResampler final : public CudaResampler<ForwardResampler> {
 
   void write_plainly(const SlabBox& box, SlabWriter& writer) override {
     const auto run = [&](const auto& sink) {
-      const bool is_whole = box.count() == voxel_count(output());
-      const Gather::Counters found =
-          gather_.run(*lattice_, box, sink, stream_, {reuse_, seen_ && is_whole ? &*seen_ : nullptr});
+      const Gather::Counters found = gather_.run(*lattice_, box, sink, stream_, {reuse_, seen_ ? &*seen_ : nullptr});
       if (reuse_ == Reuse::now && gather_.changed()) changed_ = *gather_.changed();  // then the box is all there is
       plainly_covered_ += found.covered;
       plainly_uncovered_ += static_cast<std::uint64_t>(box.count()) - found.covered;

@@ -155,7 +155,7 @@ __global__ void __launch_bounds__(kThreads) content_kernel(const __grid_constant
 /// @param changed  whether a tile has changed now; becomes whether it is made
 /// @param stale    whether it has changed before, and was left: becomes whether it is left
 __global__ void __launch_bounds__(kThreads)
-    choose_kernel(KeptTiles kept, int tiles, SeenHulls seen, std::uint8_t* changed, std::uint8_t* stale) {
+    choose_kernel(KeptTiles kept, int tiles, SeenRanges seen, std::uint8_t* changed, std::uint8_t* stale) {
   const auto n = static_cast<int>(thread_of_grid());
   if (n >= tiles) return;
   const bool differs = changed[n] != 0 || stale[n] != 0,

@@ -152,7 +152,7 @@ TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const Sla
     change_kernel<<<blocks, kThreads, 0, stream>>>(task, {kept_lattice_.packed, kept_lattice_.packing},
                                                    changed_.data());
     choose_kernel<<<blocks_for(static_cast<std::int64_t>(tiles)), kThreads, 0, stream>>>(
-        task.kept, static_cast<int>(tiles), seen ? SeenHulls::of(seen->values) : SeenHulls{}, changed_.data(),
+        task.kept, static_cast<int>(tiles), seen ? SeenRanges::of(seen->values) : SeenRanges{}, changed_.data(),
         stale_.data());
   } else {
     if (task.kept.covered) {
@@ -162,7 +162,7 @@ TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const Sla
     if (!has_records_) record_kernel<<<blocks, kThreads, 0, stream>>>(task.shape, task.records);
     if (has_content_) {
       find_content(steps, *seen, cells_.data(), stream);
-      const std::vector<ValueHull> nobody(tiles, ValueHull::of(seen->background, seen->background));
+      const std::vector<ValueHull> nobody(tiles, seen->nobody());
       content_.upload(nobody.data(), tiles, stream);
       content_kernel<<<blocks, kThreads, 0, stream>>>(task);
     }

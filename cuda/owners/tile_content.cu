@@ -35,10 +35,9 @@ __global__ void content_of_cells_kernel(StepLattice lattice, const V* voxels, gl
   ValueHull found;
   for (int n = lane_of_warp(); n < count.x * count.y * count.z; n += 32) {
     const glm::ivec3 voxel = begin + position_in(n, count);
-    const auto value = static_cast<float>(voxels[(std::int64_t{voxel.z} * size.y + voxel.y) * size.x + voxel.x]);
-    const unsigned sorted = ValueHull::sorted(value);
-    found.least = min(found.least, sorted);
-    found.most = max(found.most, sorted);
+    const auto value = static_cast<int>(voxels[(std::int64_t{voxel.z} * size.y + voxel.y) * size.x + voxel.x]);
+    found.least = min(found.least, value);
+    found.most = max(found.most, value);
   }
   found = {warp_min(found.least), warp_max(found.most)};
   if (lane_of_warp() == 0) hulls[cell] = found;
@@ -50,7 +49,7 @@ void find_content(const StepLattice& lattice, const SeenSource& seen, ValueHull*
   const std::int64_t cells = std::int64_t{lattice.cells.x} * lattice.cells.y * lattice.cells.z;
   dispatch(seen.source.type, [&](auto voxel) {
     using V = decltype(voxel);
-    if constexpr (std::is_integral_v<V>) {
+    if constexpr (std::is_integral_v<V> && sizeof(V) <= 2) {  // no others are written plainly
       content_of_cells_kernel<<<blocks_for(cells * 32), kThreads, 0, stream>>>(
           lattice, reinterpret_cast<const V*>(seen.source.voxels), glm::ivec3(seen.source.geometry->size), hulls);
     }

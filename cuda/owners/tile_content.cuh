@@ -3,11 +3,9 @@
 
 #pragma once
 
-#include <algorithm>
-#include <bit>
-#include <cstdint>
+#include <climits>
+#include <cmath>
 #include <span>
-#include <vector>
 
 #include "cuda/runtime/device_buffer.h"
 #include "deform/core/step_lattice.h"
@@ -16,50 +14,50 @@
 /// What tiles contain, so that those in which nothing is seen need not be made (`ForwardResampler::update`).
 namespace tetwarp::cuda_detail {
 
-/// The least and the largest of some values, as whole numbers in the same order: atomics find them.
+/// The least and the largest of some whole numbers.
 struct ValueHull {
-  unsigned least = ~0u, most = 0;  ///< of no value
+  int least = INT_MAX, most = INT_MIN;  ///< of no number
 
-  __host__ __device__ static unsigned sorted(float value) {
-    const auto bits = std::bit_cast<unsigned>(value + 0.0f);  // -0 is 0
-    return bits >> 31 != 0 ? ~bits : bits | 1u << 31;
+  __device__ bool meets(const ValueRange& range) const {
+    return static_cast<float>(least) <= range.high && range.low <= static_cast<float>(most);
   }
-  __host__ __device__ static ValueHull of(float least, float most) { return {sorted(least), sorted(most)}; }
-  __host__ __device__ bool meets(const ValueHull& other) const { return least <= other.most && other.least <= most; }
 };
 
 /// Values that are seen.
-struct SeenHulls {
+struct SeenRanges {
   static constexpr int kMost = 8;
 
   int count = 0;
-  ValueHull hulls[kMost];
+  ValueRange ranges[kMost];
 
-  /// @param values  rising; all that have no place of their own, and those between them, belong to the last hull
-  static SeenHulls of(std::span<const ValueRange> values) {
-    SeenHulls seen;
+  /// @param values  rising; all that have no place of their own, and those between them, belong to the last range
+  static SeenRanges of(std::span<const ValueRange> values) {
+    SeenRanges seen;
     for (const ValueRange& range : values) {
-      const ValueHull hull = ValueHull::of(range.low, range.high);
       if (seen.count < kMost) {
-        seen.hulls[seen.count++] = hull;
+        seen.ranges[seen.count++] = range;
       } else {
-        seen.hulls[kMost - 1].most = std::max(seen.hulls[kMost - 1].most, hull.most);
+        seen.ranges[kMost - 1].high = range.high;
       }
     }
     return seen;
   }
   __device__ bool meet(const ValueHull& hull) const {
     bool any = false;
-    for (int n = 0; n < count; ++n) any = any || hull.meets(hulls[n]);
+    for (int n = 0; n < count; ++n) any = any || hull.meets(ranges[n]);
     return any;
   }
 };
 
 /// What is put into the tiles, and what of it is seen.
 struct SeenSource {
-  ConstVolumeView source;          ///< whole numbers, in memory of the device, on the whole grid of the tiles' box
-  float background;                ///< of voxels that nobody owns
-  std::vector<ValueRange> values;  ///< rising
+  ConstVolumeView source;              ///< whole numbers of 16 bits at most, on the device, on the grid of the tiles
+  double background;                   ///< of voxels that nobody owns, before it is rounded
+  std::span<const ValueRange> values;  ///< rising
+
+  ValueHull nobody() const {
+    return {static_cast<int>(std::floor(background)), static_cast<int>(std::ceil(background))};
+  }
 };
 
 /// Finds the values that tetrahedra of each cell of a lattice bring where they own voxels: those around its undeformed

@@ -3,7 +3,6 @@
 
 #pragma once
 
-#include <concepts>
 #include <cstdint>
 #include <cub/warp/warp_reduce.cuh>
 #include <cub/warp/warp_scan.cuh>
@@ -50,16 +49,14 @@ __device__ inline unsigned warp_sum(unsigned value) {
   return cub::WarpReduce<unsigned>(nothing).Sum(value);
 }
 /// The least of a whole warp. @return in lane 0
-template <std::integral Whole>
-__device__ Whole warp_min(Whole value) {
-  typename cub::WarpReduce<Whole>::TempStorage nothing;
-  return cub::WarpReduce<Whole>(nothing).Reduce(value, LeastOf{});
+__device__ inline int warp_min(int value) {
+  cub::WarpReduce<int>::TempStorage nothing;
+  return cub::WarpReduce<int>(nothing).Reduce(value, LeastOf{});
 }
 /// The largest of a whole warp. @return in lane 0
-template <std::integral Whole>
-__device__ Whole warp_max(Whole value) {
-  typename cub::WarpReduce<Whole>::TempStorage nothing;
-  return cub::WarpReduce<Whole>(nothing).Reduce(value, LargestOf{});
+__device__ inline int warp_max(int value) {
+  cub::WarpReduce<int>::TempStorage nothing;
+  return cub::WarpReduce<int>(nothing).Reduce(value, LargestOf{});
 }
 
 /// The least of a whole warp that is a number, as `fminf` has it. @return in every lane
