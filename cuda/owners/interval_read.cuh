@@ -54,7 +54,7 @@ __device__ void read_tetrahedra(const IntervalTile<Shape>& tile) {
     const auto flags = static_cast<unsigned>(box.w);
     RowLine lines[4];
     read_lines(records, number, lines);
-    const int zone = shift_lines(lines, reach_of(tile, words, own));
+    const int zone = shift_lines(lines, static_cast<int>(RecordFlags::Level::get(flags)), reach_of(tile, words, own));
     const auto lower = static_cast<int>(RecordFlags::Lower::get(flags)),
                upper = static_cast<int>(RecordFlags::Upper::get(flags));
     order_lines(lines, lower, upper, reinterpret_cast<RowLine*>(memory.prepared[slot]));

@@ -44,16 +44,17 @@ struct VoxelRange {
 
 /// How the lines of a record are to be taken.
 ///
-///     10      9         8       7     4 3     0
-///     +----------+---------+---------+---------+---------+
-///     |  AtRest  | Usable  |  Steep  |  Upper  |  Lower  |
-///     +----------+---------+---------+---------+---------+
+///     14    11    10       9         8       7     4 3     0
+///     +-------+----------+---------+---------+---------+---------+
+///     | Level |  AtRest  | Usable  |  Steep  |  Upper  |  Lower  |
+///     +-------+----------+---------+---------+---------+---------+
 struct RecordFlags {
   using Lower = BitField<0, 4>;  ///< bits of faces, as `RowLines` has them
   using Upper = BitField<Lower::kEnd, 4>;
   using Steep = BitField<Upper::kEnd, 1>;
   using Usable = BitField<Steep::kEnd, 1>;   ///< whether the map is
   using AtRest = BitField<Usable::kEnd, 1>;  ///< whether no vertex moves
+  using Level = BitField<AtRest::kEnd, 4>;   ///< bits of faces
 };
 
 /// Records of all tetrahedra, quad after quad, so that neighbouring threads write neighbouring places.
@@ -93,7 +94,7 @@ __device__ void put_record(const Records& records, std::int64_t n, const Tetrahe
       make_int4(ranges.x, ranges.y, ranges.z,
                 static_cast<int>(RecordFlags::Lower::put(rows.lower) | RecordFlags::Upper::put(rows.upper) |
                                  RecordFlags::Steep::put(flag(rows.is_steep)) | RecordFlags::Usable::put(flag(usable)) |
-                                 RecordFlags::AtRest::put(flag(rests))));
+                                 RecordFlags::AtRest::put(flag(rests)) | RecordFlags::Level::put(rows.level)));
   const RowLine(&l)[4] = rows.lines;
   const auto quad = [](float x, float y, float z, float w) {
     return make_int4(__float_as_int(x), __float_as_int(y), __float_as_int(z), __float_as_int(w));

@@ -24,6 +24,7 @@ struct RowLines {
   RowLine lines[4]{};  ///< of the faces opposite A, B, C and D
   /// Bits of the faces through which rows enter, and through which they leave; where both are 0 nothing is known.
   int lower = 0, upper = 0;
+  int level = 0;  ///< bits of the faces whose slopes are 0, 1 or -1: they cross all rows equally far from a voxel
   bool is_steep = true;  ///< whether only bounds of the error of each line tell enough
 };
 
@@ -102,6 +103,8 @@ TETWARP_HD inline RowLines make_row_lines(const glm::i32vec3& a, const glm::i32v
     of.lines[face] = {static_cast<float>(((at.x - y * at.y) - z * at.z) * (1.0 / kStepsPerVoxel)),
                       static_cast<float>(y), static_cast<float>(z)};
     (to * x < 0 ? of.lower : of.upper) |= 1 << face;
+    const auto is_whole = [&](double of_axis) { return of_axis == 0 || std::fabs(of_axis) == std::fabs(n.x); };
+    if (is_whole(n.y) && is_whole(n.z)) of.level |= 1 << face;
   };
   add(0, bc, q, -out);  // through D, away from A
   add(1, ca, q, -out);
@@ -166,15 +169,27 @@ TETWARP_HD inline float line_error(float at, float along_y, float along_z, const
 }  // namespace detail
 
 /// Lets lines begin at the nudged first voxel of a tile, where they began at their origin.
-/// @return the zone: crossings are wrong by less than 2^(zone - 17) voxel; more than `kMostZone` where that is too much
-TETWARP_HD inline int shift_lines(RowLine (&lines)[4], const RowReach& reach) {
+///
+/// A level face that goes through voxels crosses all rows at one nudge from them. Beside a steep face, whose error is
+/// larger than that, each of these rows would be left to exact integers. But wherever between two voxels a row is
+/// crossed, the voxels are the same: so a level face is put half way between two.
+///
+/// @param level  of `RowLines`
+/// @return the zone: crossings are wrong by less than 2^(zone - 17) voxel, or lie half way between voxels as they
+///         should; more than `kMostZone` where that is too much
+TETWARP_HD inline int shift_lines(RowLine (&lines)[4], int level, const RowReach& reach) {
   const glm::vec3 to = reach.moved();
   float most = 0;
-  for (RowLine& line : lines) {
+  for (int face = 0; face < 4; ++face) {
+    RowLine& line = lines[face];
     const float s1 = detail::multiply_add(line.along_y, to.y, line.at),
-                s2 = detail::multiply_add(line.along_z, to.z, s1), s3 = s2 - to.x;
-    most = std::fmax(most, detail::line_error(line.at, line.along_y, line.along_z, reach, s1, s2, s3));
+                s2 = detail::multiply_add(line.along_z, to.z, s1), s3 = s2 - to.x,
+                error = detail::line_error(line.at, line.along_y, line.along_z, reach, s1, s2, s3);
+    most = std::fmax(most, error);
     line.at = s3;
+    if ((level >> face & 1) == 0) continue;
+    const auto next = static_cast<float>(detail::ceil_to_int(s3));
+    if (std::fmin(next - s3, s3 - (next - 1)) > 0x1.1p-24f * error) line.at = next - 0.5f;
   }
   // In numbers of 2^-17 voxel, of which 2^-24 is 2^-7. On top of v comes the lift, 66 and rounded, and then z
   // `along_z`, which gives less than 128, rounded. What is left out, 2^-24 of all that, is less than what 1/126 has too
