@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <optional>
 
@@ -33,8 +35,8 @@ class Updates : public testing::Test {
     output_there_.emplace(poisoned<std::int16_t>(grid_).voxels);
     device_ = make_forward_resampler(BackendKind::cuda, grid_);
     cpu_ = make_cpu_resampler(grid_);
-    renderer_ = make_renderer(BackendKind::cuda);
-    renderer_->set_style(style_);
+    for (std::unique_ptr<Renderer>& renderer : renderers_) renderer = make_renderer(BackendKind::cuda);
+    set_style(style_.transfer);
   }
 
   Target target_there(double background = -7) {
@@ -72,23 +74,29 @@ class Updates : public testing::Test {
     for (const Region& region : changed_) within += voxel_count(region);
     return within;
   }
-  /// The picture of what the device holds, by a renderer that was told of each change, and of what it should hold.
+  void set_style(const TransferFunction& transfer) {
+    style_.transfer = transfer;
+    for (const std::unique_ptr<Renderer>& renderer : renderers_) renderer->set_style(style_);
+  }
+  /// The pictures of what the device holds, by renderers that were told of each change, and of what it should hold.
   void expect_picture(bool is_first) { expect_picture(is_first, output_there_->download()); }
   /// The same. @param voxels  of which it should be the picture
   void expect_picture(bool is_first, const std::vector<std::int16_t>& voxels) {
     const Volume<std::int16_t> expected{grid_, voxels};
-    if (is_first) {
-      renderer_->set_volume(on_device(view(held_), output_there_->data()));
-    } else {
-      renderer_->update_volume(changed_);
-    }
     const auto on_cpu = make_cpu_renderer();
     on_cpu->set_style(style_);
     on_cpu->set_volume(view(expected));
-    for (const double angle : {40.0, 220.0}) {
+    double angle = 40;
+    for (const std::unique_ptr<Renderer>& renderer : renderers_) {  // one sees one side
+      if (is_first) {
+        renderer->set_volume(on_device(view(held_), output_there_->data()));
+      } else {
+        renderer->update_volume(changed_);
+      }
       const ViewPlane plane = view_plane({.angle_deg = angle, .width = kWidth, .height = kHeight}, grid_);
+      angle += 180;
       std::vector<std::uint8_t> found(3 * kWidth * kHeight), wanted(found.size());
-      renderer_->render(plane, found);
+      renderer->render(plane, found);
       on_cpu->render(plane, wanted);
       EXPECT_EQ(found, wanted);
     }
@@ -109,7 +117,7 @@ class Updates : public testing::Test {
   std::optional<OnDevice<std::int16_t>> source_there_, output_there_;
   std::unique_ptr<ForwardResampler> device_, cpu_;
   RenderStyle style_{.transfer = transfer_function("ct-bone")};
-  std::unique_ptr<Renderer> renderer_;
+  std::array<std::unique_ptr<Renderer>, 2> renderers_;
   std::vector<Region> changed_;  ///< by the last update
 };
 
@@ -195,8 +203,7 @@ TEST_F(SeenUpdates, ShowThePictureOfTheWholeVolume) {
   std::size_t differing = 0;
   for (const char* const name : {"ct-bone", "ct-lung", "ct-vessel", "mip", "xray"}) {
     SCOPED_TRACE(name);
-    style_.transfer = transfer_function(name);
-    renderer_->set_style(style_);
+    set_style(transfer_function(name));
     const std::vector<ValueRange> seen = seen_values(style_);
     for (const double background : {-1000.0, 900.0}) {
       for (const std::int64_t cell : {8, 16}) {
@@ -290,6 +297,24 @@ TEST_F(SeenUpdates, MakeWhatWasLeftWhenItMayBeSeen) {
   move_some(field, 1, 2);
   update(field, 0, bone);  // what tiles contain is not known since the call before, so all are made
   EXPECT_EQ(changed_, std::vector<Region>{whole(grid_)});
+}
+
+/// A background that lies between two whole numbers is one of them in the volume, and is seen as that.
+TEST_F(SeenUpdates, MakeHolesOfARoundedBackground) {
+  make_source([](const glm::ivec3&) { return 1000; });
+  for (const double background : {-7.4, -7.5, 8.5, 8.6}) {
+    SCOPED_TRACE(background);
+    VertexField field = uniform_field(lattice_over(grid_, 8), glm::vec3(40, 0, 0));
+    const std::vector<std::int16_t> expected = whole_pass(field, background);
+    const std::int16_t hole = *std::min_element(expected.begin(), expected.end());
+    EXPECT_LE(std::abs(hole - background), 0.5);
+    const std::vector<ValueRange> seen{{static_cast<float>(hole), static_cast<float>(hole)}};
+    device_ = make_forward_resampler(BackendKind::cuda, grid_);
+    update(uniform_field(field.lattice, glm::vec3(0)), background, seen);
+    update(field, background, seen);
+    const std::vector<std::int16_t> found = output_there_->download();
+    for (std::size_t n = 0; n < expected.size(); ++n) ASSERT_EQ(found[n] == hole, expected[n] == hole) << n;
+  }
 }
 
 TEST_F(Updates, ClearWhatTissueHasLeft) {
