@@ -131,14 +131,18 @@ __global__ void spread_kernel(const std::uint8_t* from, glm::ivec3 blocks, int a
 
 /// Casts the rays of a picture: a thread a pixel, a warp 8 x 4 pixels, so that its rays read the same voxels.
 ///
-/// @param scene          volume, tables and camera  @param width, height  pixels of the picture
-/// @param rgb            three bytes a pixel, row by row: written
+/// @param scene    volume, tables and camera  @param width, height  pixels of the picture
+/// @param patches  y * columns + x of each patch of 8 x 4 pixels that is wanted; null: all  @param count  how many
+/// @param rgb      three bytes a pixel, row by row: written
 template <class V>
 __global__ void __launch_bounds__(kPatches * 32, 8)
-    ray_kernel(RayScene<V> scene, int width, int height, std::uint8_t* rgb) {
-  const int lane = static_cast<int>(threadIdx.x) % 32, patch = static_cast<int>(threadIdx.x) / 32;
-  const int x = (static_cast<int>(blockIdx.x) * kPatches + patch) * kPatchWidth + lane % kPatchWidth,
-            y = static_cast<int>(blockIdx.y) * kPatchHeight + lane / kPatchWidth;
+    ray_kernel(RayScene<V> scene, int width, int height, const int* patches, int count, std::uint8_t* rgb) {
+  const int lane = static_cast<int>(threadIdx.x) % 32,
+            n = static_cast<int>(blockIdx.x) * kPatches + static_cast<int>(threadIdx.x) / 32;
+  if (n >= count) return;
+  const int patch = patches ? patches[n] : n, columns = (width + kPatchWidth - 1) / kPatchWidth;
+  const int x = patch % columns * kPatchWidth + lane % kPatchWidth,
+            y = patch / columns * kPatchHeight + lane / kPatchWidth;
   if (x >= width || y >= height) return;
   const RayColour colour = cast_ray(scene, x, y);
   std::uint8_t* const pixel = rgb + 3 * (static_cast<std::int64_t>(y) * width + x);

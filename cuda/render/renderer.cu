@@ -9,6 +9,7 @@
 #include "cuda/runtime/host_copies.h"
 #include "cuda/runtime/launch.cuh"
 #include "cuda/runtime/pointer_check.h"
+#include "deform/render/stale_patches.h"
 
 namespace tetwarp {
 
@@ -42,6 +43,7 @@ class CudaRenderer final : public Renderer {
     style_ = style;
     table_step_ = 0;
     distances_are_stale_ = true;
+    stale_.forget();
   }
   void set_tints(const Tints& tints) override;
   void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
@@ -82,11 +84,12 @@ class CudaRenderer final : public Renderer {
   DeviceBuffer<TransferIntegral> integrals_;
   TransferIntegral lowest_, highest_;  ///< entries
   ClearValues clear_;
-  DeviceBuffer<int> opaque_before_, block_rows_;
+  DeviceBuffer<int> opaque_before_, block_rows_, patches_;
   DeviceBuffer<float> picked_;
   const std::uint8_t* tints_ = nullptr;
   double table_step_ = 0;  ///< mm, that the tables are for
   bool distances_are_stale_ = true;
+  StalePatches stale_{kPatchWidth, kPatchHeight};  ///< of `picture_`
 };
 
 /// Makes room for the copy, where there is any, and decides what rays read.
@@ -152,11 +155,12 @@ void CudaRenderer::update_volume(std::span<const Region> changed, const Control&
   const auto count = static_cast<int>(rows.size());
   if (on_host_ || count > blocks_.y * blocks_.z / 2) {
     read_all(stream);
-    return;
+  } else {
+    block_rows_.upload(rows.data(), rows.size(), stream);
+    copy_rows(block_rows_.data(), count, stream);
+    find_ranges(block_rows_.data(), count, stream);
   }
-  block_rows_.upload(rows.data(), rows.size(), stream);
-  copy_rows(block_rows_.data(), count, stream);
-  find_ranges(block_rows_.data(), count, stream);
+  stale_.change(geometry_, changed);  // while the device is at work
 }
 
 void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& control) {
@@ -173,6 +177,7 @@ void CudaRenderer::set_volume(const ConstVolumeView& volume, const Control& cont
   place_copy();
   read_all(static_cast<cudaStream_t>(control.stream));
   tints_ = nullptr;
+  stale_.forget();
 }
 
 void CudaRenderer::read_all(cudaStream_t stream) {
@@ -186,6 +191,7 @@ void CudaRenderer::read_all(cudaStream_t stream) {
 void CudaRenderer::set_tints(const Tints& tints) {
   require_valid(tints, volume_);
   tints_ = nullptr;
+  stale_.forget();
   if (!tints.numbers.voxels) return;
   const DeviceScope scope(device_);
   require_memory(tints.numbers.voxels, tints.numbers.memory, "the tints");
@@ -251,13 +257,22 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
   cudaPointerAttributes found{};
   TETWARP_CUDA_TRY(cudaPointerGetAttributes(&found, rgb.data()));
   const bool on_device = found.type == cudaMemoryTypeDevice || found.type == cudaMemoryTypeManaged;
-  std::uint8_t* const pixels = on_device ? rgb.data() : picture_.reserve(rgb.size());
-  with_scene(plane, stream, [&](const auto& scene) {
-    const dim3 grid(blocks_for(plane.width, kPatches * kPatchWidth), blocks_for(plane.height, kPatchHeight));
-    ray_kernel<<<grid, kPatches * 32, 0, stream>>>(scene, plane.width, plane.height, pixels);
-  });
-  if (!on_device) TETWARP_CUDA_TRY(cudaMemcpyAsync(rgb.data(), pixels, rgb.size(), cudaMemcpyDeviceToHost, stream));
+  const std::optional<std::vector<int>> patches = stale_.take(plane);
+  const bool is_kept = stale_.is_worth_keeping();
+  std::uint8_t* const pixels = on_device && !is_kept ? rgb.data() : picture_.reserve(rgb.size());
+  const unsigned count = patches ? static_cast<unsigned>(patches->size())
+                                 : blocks_for(plane.width, kPatchWidth) * blocks_for(plane.height, kPatchHeight);
+  if (count > 0) {
+    if (patches) patches_.upload(patches->data(), patches->size(), stream);
+    with_scene(plane, stream, [&](const auto& scene) {
+      ray_kernel<<<blocks_for(count, kPatches), kPatches * 32, 0, stream>>>(
+          scene, plane.width, plane.height, patches ? patches_.data() : nullptr, static_cast<int>(count), pixels);
+    });
+  }
+  if (pixels != rgb.data())
+    TETWARP_CUDA_TRY(cudaMemcpyAsync(rgb.data(), pixels, rgb.size(), cudaMemcpyDefault, stream));
   TETWARP_CUDA_TRY(cudaStreamSynchronize(stream));
+  if (is_kept) stale_.keep(plane);
 }
 
 std::optional<glm::dvec3> CudaRenderer::pick(const ViewPlane& plane, int column, int row, const Control& control) {

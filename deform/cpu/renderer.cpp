@@ -10,6 +10,7 @@
 #include "deform/cpu/tiles.h"
 #include "deform/render/ray_blocks.h"
 #include "deform/render/ray_frame.h"
+#include "deform/render/stale_patches.h"
 
 namespace tetwarp {
 
@@ -31,10 +32,12 @@ class CpuRenderer final : public Renderer {
     ranges_ = block_ranges(volume_, limits_);
     distances_.clear();
     tint_numbers_ = nullptr;
+    stale_.forget();
   }
 
   void update_volume(std::span<const Region> changed, const Control&) override {
     require(volume_.voxels != nullptr, "no volume is set that could have changed: call set_volume first");
+    stale_.change(geometry_, changed);
     if (changed.empty()) return;
     ranges_ = block_ranges(volume_, limits_);
     distances_.clear();
@@ -45,12 +48,14 @@ class CpuRenderer final : public Renderer {
     style_ = style;
     table_step_ = 0;
     distances_.clear();
+    stale_.forget();
   }
 
   void set_tints(const Tints& tints) override {
     require_valid(tints, volume_);
     tint_numbers_ = reinterpret_cast<const std::uint8_t*>(tints.numbers.voxels);
     tint_colours_ = tint_table(tints);
+    stale_.forget();
   }
 
   void render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) override;
@@ -61,7 +66,8 @@ class CpuRenderer final : public Renderer {
   template <class Use>
   void with_scene(const ViewPlane& plane, Use&& use);
   template <class V>
-  void cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb, const Control& control) const;
+  void cast(const RayScene<V>& scene, const ViewPlane& plane, const std::optional<std::vector<int>>& patches,
+            std::uint8_t* rgb, const Control& control) const;
 
   Limits limits_;
   Geometry geometry_;
@@ -75,6 +81,8 @@ class CpuRenderer final : public Renderer {
   const std::uint8_t* tint_numbers_ = nullptr;
   std::vector<TransferEntry> tint_colours_;
   double table_step_ = 0;  ///< mm between samples, for which the tables were made
+  StalePatches stale_{kPatch, kPatch};
+  std::vector<std::uint8_t> picture_;  ///< that was kept
 };
 
 void CpuRenderer::prepare(const RayFrame& frame, double step) {
@@ -121,13 +129,16 @@ auto best_row() {
   return &cast_plain_row<V>;
 }
 
+/// Casts the rays of patches of a picture. @param patches  empty: all
 template <class V>
-void CpuRenderer::cast_all(const RayScene<V>& scene, const ViewPlane& plane, std::uint8_t* rgb,
-                           const Control& control) const {
+void CpuRenderer::cast(const RayScene<V>& scene, const ViewPlane& plane, const std::optional<std::vector<int>>& patches,
+                       std::uint8_t* rgb, const Control& control) const {
   const int columns = (plane.width + kPatch - 1) / kPatch, rows = (plane.height + kPatch - 1) / kPatch;
+  const int count = patches ? static_cast<int>(patches->size()) : columns * rows;
   const auto cast = best_row<V>();
   std::atomic<bool> stopped = false;
-  tbb::parallel_for(0, columns * rows, [&](int patch) {
+  tbb::parallel_for(0, count, [&](int n) {
+    const int patch = patches ? (*patches)[static_cast<std::size_t>(n)] : n;
     if (stopped || control.stop.stop_requested()) {
       stopped = true;
       return;
@@ -171,7 +182,13 @@ void CpuRenderer::with_scene(const ViewPlane& plane, Use&& use) {
 
 void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
   require_ready(volume_, style_, plane, rgb.size());
-  with_scene(plane, [&](const auto& scene) { cast_all(scene, plane, rgb.data(), control); });
+  if (control.stop.stop_requested()) throw Cancelled();
+  const std::optional<std::vector<int>> patches = stale_.take(plane);
+  if (patches) std::copy(picture_.begin(), picture_.end(), rgb.begin());
+  with_scene(plane, [&](const auto& scene) { cast(scene, plane, patches, rgb.data(), control); });
+  if (!stale_.is_worth_keeping()) return;
+  picture_.assign(rgb.begin(), rgb.end());
+  stale_.keep(plane);
 }
 
 std::optional<glm::dvec3> CpuRenderer::pick(const ViewPlane& plane, int column, int row, const Control&) {

@@ -40,6 +40,8 @@ struct ViewPlane {
   /// A point (LPS mm) as the picture sees it: pixels from the left edge, pixels from the upper edge, and mm behind the
   /// plane.
   glm::dvec3 project(const glm::dvec3& point) const;
+  /// Whether pixels and rays are the same.
+  friend bool operator==(const ViewPlane&, const ViewPlane&) = default;
 };
 
 /// The plane onto which a camera projects a volume.

@@ -61,8 +61,8 @@ class Renderer {
   /// @throws InputError for a style with a number out of its range
   virtual void set_style(const RenderStyle& style) = 0;
 
-  /// Takes colours for the volume that was set last. `render` reads their voxels. Only Projection::composite shows
-  /// them.
+  /// Takes colours for the volume that was set last. Only Projection::composite shows them. The view is kept: call it
+  /// again whenever its voxels have changed.
   /// @throws InputError for another grid, type or memory than that of the volume, or more than 256 colours
   virtual void set_tints(const Tints& tints) = 0;
 

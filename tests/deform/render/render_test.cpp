@@ -590,6 +590,129 @@ TEST_P(Rendered, ShowsWhatWasChangedAsIfItWereSetAnew) {
   }
 }
 
+/// A renderer that is told what has changed, beside one that sees the whole volume anew each time.
+class WatchedVolume {
+ public:
+  WatchedVolume(const test::Backend& backend, Geometry grid, Random& random)
+      : random_(random),
+        volume_(blobs(grid, random)),
+        renderer_(backend.make_renderer({})),
+        anew_(backend.make_renderer({})) {
+    renderer_->set_volume(seen());
+  }
+
+  Renderer& renderer() { return *renderer_; }
+  const Geometry& grid() const { return volume_.geometry; }
+  void set_style(const RenderStyle& style) {
+    style_ = style;
+    renderer_->set_style(style);
+  }
+  /// Changes up to `count` boxes of up to `most` voxels along each axis.
+  void change(int count, int most) {
+    std::vector<Region> changed(static_cast<std::size_t>(random_.integer(0, count)));
+    for (Region& region : changed) {
+      const auto value = static_cast<float>(random_.real(-20, 120));
+      for (int axis = 0; axis < 3; ++axis) {
+        region.begin[axis] = random_.integer(0, grid().size[axis] - 1);
+        region.end[axis] = std::min(region.begin[axis] + random_.integer(1, most), grid().size[axis]);
+      }
+      for (std::int64_t k = region.begin.z; k < region.end.z; ++k)
+        for (std::int64_t j = region.begin.y; j < region.end.y; ++j)
+          for (std::int64_t i = region.begin.x; i < region.end.x; ++i)
+            volume_.voxels[static_cast<std::size_t>((k * grid().size.y + j) * grid().size.x + i)] = value;
+    }
+    renderer_->update_volume(changed);
+  }
+  void expect_picture(const ViewPlane& plane) {
+    std::vector<std::uint8_t> found(3 * static_cast<std::size_t>(plane.width * plane.height));
+    renderer_->render(plane, found);
+    EXPECT_EQ(found, render(*anew_, seen(), style_, plane).rgb);
+  }
+
+ private:
+  ConstVolumeView seen() const { return view(volume_); }
+
+  Random& random_;
+  Volume<float> volume_;
+  RenderStyle style_;
+  std::unique_ptr<Renderer> renderer_, anew_;
+};
+
+Camera random_camera(Random& random) {
+  return {.angle_deg = random.real(0, 360),
+          .elevation_deg = random.real(-90, 90),
+          .zoom = random.chance(0.3) ? random.real(2, 40) : random.real(0.3, 1.5),
+          .width = static_cast<int>(random.integer(1, 90)),
+          .height = static_cast<int>(random.integer(1, 90))};
+}
+
+TEST_P(Rendered, ShowsSmallChangesInOnePictureAfterAnother) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  RenderStyle lit = opaque_from(40, 0.3), hazy = opaque_from(15, 0.01);
+  lit.transfer.gradient = 5;
+  hazy.transfer.gradient = 2;
+  const RenderStyle styles[] = {lit, hazy, brightest(100), summed(100, 4000)};
+  for (std::uint64_t n = 0; n < test::test_cases(24); ++n) {
+    SCOPED_TRACE("case " + std::to_string(n));
+    Random random(test_seed(), 8300 + n);
+    Geometry grid = oblique_grid({random.integer(2, 50), random.integer(2, 50), random.integer(2, 50)});
+    if (random.chance(0.3)) grid.direction[2] = glm::normalize(grid.direction[2] + 0.4 * grid.direction[1]);
+    WatchedVolume watched(GetParam(), grid, random);
+    watched.set_style(random.one_of(styles));
+    const ViewPlane plane = view_plane(random_camera(random), grid);
+    for (int picture = 0; picture < 12; ++picture) {
+      for (int update = 0; update < 2; ++update) watched.change(3, picture % 4 == 3 ? 30 : 3);
+      if (random.chance(0.15)) watched.set_style(random.one_of(styles));
+      if (random.chance(0.15)) watched.expect_picture(view_plane(random_camera(random), grid));
+      watched.expect_picture(plane);
+    }
+  }
+}
+
+TEST_P(Rendered, ShowsAChangeAfterAPictureThatWasStopped) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 8400);
+  WatchedVolume watched(GetParam(), unit_grid({40, 40, 40}), random);
+  watched.set_style(opaque_from(40, 0.3));
+  const ViewPlane plane = view_plane({.width = 60, .height = 50}, watched.grid());
+  std::stop_source source;
+  source.request_stop();
+  for (int n = 0; n < 3; ++n) {
+    watched.change(3, 9);
+    watched.expect_picture(plane);
+    watched.change(3, 9);
+    std::vector<std::uint8_t> rgb(3 * 60 * 50);
+    EXPECT_THROW(watched.renderer().render(plane, rgb, {.stop = source.get_token()}), Cancelled);
+    watched.expect_picture(plane);
+  }
+}
+
+TEST_P(Rendered, ShowsTintsThatAreSetAfterAPictureWithout) {
+  const auto renderer = GetParam().make_renderer({});
+  const Volume<std::int16_t> body =
+      volume_of<std::int16_t>(unit_grid({20, 20, 20}), [](const glm::i64vec3&) { return 100; });
+  const ViewPlane plane = view_plane({.width = 30, .height = 30}, body.geometry);
+  Image image = render(*renderer, view(body), opaque_from(50, 0.9), plane);
+  const Region corner{{0, 0, 0}, {1, 1, 1}};
+  const auto expect_middle = [&](const glm::ivec3& colour) {
+    for (int n = 0; n < 2; ++n) {
+      renderer->update_volume({&corner, 1});
+      renderer->render(plane, image.rgb);
+      for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(image.at(15, 15)[channel], colour[channel], 1);
+    }
+  };
+  const std::vector<glm::vec4> colours{glm::vec4(0), glm::vec4(1, 0, 0, 1), glm::vec4(0, 1, 0, 1)};
+  expect_middle({255, 255, 255});
+  for (const std::uint8_t number : {std::uint8_t{1}, std::uint8_t{2}}) {
+    const Volume<std::uint8_t> numbers =
+        volume_of<std::uint8_t>(body.geometry, [&](const glm::i64vec3&) { return number; });
+    renderer->set_tints({view(numbers), colours});
+    expect_middle(255 * glm::ivec3(number == 1, number == 2, 0));
+    renderer->set_tints({});
+    expect_middle({255, 255, 255});
+  }
+}
+
 TEST_P(Rendered, RefusesWhatItCannotShow) {
   EXPECT_THROW(GetParam().make_renderer({})->update_volume({}), InputError);
   const auto renderer = GetParam().make_renderer({});
