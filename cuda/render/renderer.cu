@@ -156,6 +156,7 @@ void CudaRenderer::update_volume(std::span<const Region> changed, const Control&
   if (on_host_ || count > blocks_.y * blocks_.z / 2) {
     read_all(stream);
   } else {
+    block_rows_.reserve(static_cast<std::size_t>(blocks_.y) * static_cast<std::size_t>(blocks_.z));  // once
     block_rows_.upload(rows.data(), rows.size(), stream);
     copy_rows(block_rows_.data(), count, stream);
     find_ranges(block_rows_.data(), count, stream);
@@ -260,10 +261,13 @@ void CudaRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, c
   const std::optional<std::vector<int>> patches = stale_.take(plane);
   const bool is_kept = stale_.is_worth_keeping();
   std::uint8_t* const pixels = on_device && !is_kept ? rgb.data() : picture_.reserve(rgb.size());
-  const unsigned count = patches ? static_cast<unsigned>(patches->size())
-                                 : blocks_for(plane.width, kPatchWidth) * blocks_for(plane.height, kPatchHeight);
+  const unsigned all = blocks_for(plane.width, kPatchWidth) * blocks_for(plane.height, kPatchHeight),
+                 count = patches ? static_cast<unsigned>(patches->size()) : all;
   if (count > 0) {
-    if (patches) patches_.upload(patches->data(), patches->size(), stream);
+    if (patches) {
+      patches_.reserve(all);  // once, for the device waits for a larger array
+      patches_.upload(patches->data(), patches->size(), stream);
+    }
     with_scene(plane, stream, [&](const auto& scene) {
       ray_kernel<<<blocks_for(count, kPatches), kPatches * 32, 0, stream>>>(
           scene, plane.width, plane.height, patches ? patches_.data() : nullptr, static_cast<int>(count), pixels);
