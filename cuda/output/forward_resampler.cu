@@ -11,7 +11,6 @@
 #include "cuda/factories.h"
 #include "cuda/lattice/lattice_part.h"
 #include "cuda/output/mesh_resampler.h"
-#include "cuda/output/updated_target.h"
 #include "cuda/owners/gather.cuh"
 #include "cuda/runtime/pointer_check.h"
 #include "cuda/runtime/warp.cuh"
@@ -19,6 +18,7 @@
 #include "deform/field_check.h"
 #include "deform/lattice_or_mesh.h"
 #include "deform/target_check.h"
+#include "deform/updated_target.h"
 
 namespace tetwarp {
 

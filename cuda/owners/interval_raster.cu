@@ -8,6 +8,7 @@
 #include "cuda/owners/interval_kernel.cuh"
 #include "cuda/owners/interval_list.cuh"
 #include "cuda/runtime/fetch.h"
+#include "deform/tile_regions.h"
 
 namespace tetwarp::cuda_detail {
 
@@ -42,30 +43,6 @@ std::int64_t count_of(const glm::ivec3& tiles) { return std::int64_t{tiles.x} * 
 /// Cells for which tiles of full depth have room.
 bool is_for_deep(const StepLattice& lattice) {
   return std::min({lattice.cell.x, lattice.cell.y, lattice.cell.z}) >= 7 * kStepsPerVoxel;
-}
-
-/// The voxels of a box that marked tiles have: a region for each run of tiles along i.
-std::vector<Region> regions_of(std::span<const std::uint8_t> marked, const glm::ivec3& tiles, const glm::ivec3& size,
-                               const glm::ivec3& origin, const SlabBox& box) {
-  const Region all{box.begin, box.begin + box.size};
-  std::vector<Region> regions;
-  std::size_t n = 0;
-  for (int z = 0; z < tiles.z; ++z) {
-    for (int y = 0; y < tiles.y; ++y) {
-      int begin = -1;
-      for (int x = 0; x <= tiles.x; ++x) {
-        const bool is_marked = x < tiles.x && marked[n + static_cast<std::size_t>(x)] != 0;
-        if (is_marked && begin < 0) begin = x;
-        if (is_marked || begin < 0) continue;
-        regions.push_back(intersection({glm::i64vec3(origin + glm::ivec3(begin, y, z) * size),
-                                        glm::i64vec3(origin + glm::ivec3(x, y + 1, z + 1) * size)},
-                                       all));
-        begin = -1;
-      }
-      n += static_cast<std::size_t>(tiles.x);
-    }
-  }
-  return regions;
 }
 
 }  // namespace
@@ -183,8 +160,8 @@ TileCounters IntervalRaster::run_tiles(const LatticeOnDevice& lattice, const Sla
   if (found.left != 0) {
     kept_depth_ = 0;
   } else if (only_changed) {
-    made_ =
-        regions_of({changed_on_host_.reserve(tiles), tiles}, task.tiles, {kTileI, kTileJ, kDepth}, task.origin, box);
+    made_ = regions_of_tiles({changed_on_host_.reserve(tiles), tiles}, task.tiles, {kTileI, kTileJ, kDepth},
+                             task.origin, {box.begin, box.begin + box.size});
   }
   return found;
 }

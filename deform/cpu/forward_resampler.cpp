@@ -9,6 +9,7 @@
 #include "deform/cpu/coverage.h"
 #include "deform/cpu/intervals/interval_writer.h"
 #include "deform/cpu/intervals/lattice_raster.h"
+#include "deform/cpu/kept_tiles.h"
 #include "deform/cpu/lattice_index.h"
 #include "deform/cpu/map_writer.h"
 #include "deform/cpu/march.h"
@@ -56,7 +57,7 @@ struct TileVoxels {
 /// of other lattices, are claimed.
 class LatticeResampler final : public ForwardResampler {
  public:
-  LatticeResampler(Geometry output, const Limits& limits) : ForwardResampler(output), arena_(limits) {}
+  LatticeResampler(Geometry output, const Limits& limits) : ForwardResampler(output), arena_(limits), kept_(output) {}
 
   void set_field(const FieldView& field, const FieldOptions& options, const Control& control) override {
     ready_ = false;
@@ -86,6 +87,26 @@ class LatticeResampler final : public ForwardResampler {
 
   Report resample(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
                   const PartSink& finished) override {
+    kept_.forget();
+    return make(region, targets, maps, control, finished, nullptr);
+  }
+
+  Update update(std::span<const Target> targets, const Control& control, std::span<const ValueRange> seen) override {
+    const bool may_keep =
+        ready_ && lattice_.frame().coarse &&
+        std::all_of(targets.begin(), targets.end(), [](const Target& target) { return target.sampled_slices.empty(); });
+    if (!may_keep) return ForwardResampler::update(targets, control, seen);
+    arena_.execute([&] { kept_.compare(lattice_, targets); });
+    const Report report = make(whole(output()), targets, {}, control, {}, &kept_);
+    kept_.keep(lattice_, targets);
+    return {report, kept_.changed()};
+  }
+
+ private:
+  /// Computes a region of targets and maps, as `resample` does.
+  /// @param kept  says which tiles have to be made, of the whole output; null: all
+  Report make(Region region, std::span<const Target> targets, const Maps& maps, const Control& control,
+              const PartSink& finished, KeptTiles* kept) {
     require(ready_, "resample needs a field: call set_field first");
     const TargetSamplers samplers = make_samplers(*this, targets, region);
     const MapWriter writer(maps, output(), region);
@@ -101,23 +122,28 @@ class LatticeResampler final : public ForwardResampler {
       return !samplers.empty() && places_only && !writer.wants_any() &&
              std::all_of(samplers.begin(), samplers.end(), [&](const auto& of) { return of->can_copy(box); });
     };
-    const auto is_copied = [&](const Region& box) { return can_copy(box) && rests(box); };
+    const auto is_copied = [&](const Region& box) { return !kept && can_copy(box) && rests(box); };
     const TileTargets to{samplers, writer, form(), lattice_.frame().nudge};
-    Report report = for_each_tile<TileVoxels>(
-        arena_, region, control, finished, is_copied, [&](const Region& box, TileVoxels& tile) {
-          if (!writer.wants_owners() && !writer.wants_tetrahedra() && rests(box))
-            return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
-          Report of_tile;
-          const bool gathered = may_march && !mostly_folds(box) && gather(box, tile, of_tile.paths);
-          if (!gathered && lattice_.frame().coarse) {
-            of_tile.paths.gathered += static_cast<std::uint64_t>(voxel_count(box));
-            write_intervals(box, tile, to, of_tile);
-            return of_tile;
-          }
-          if (!gathered) claim_all(box, tile, writer, of_tile.paths);
-          write(box, tile, samplers, writer, of_tile);
-          return of_tile;
-        });
+    const auto make_tile = [&](const Region& box, TileVoxels& tile) {
+      if (!writer.wants_owners() && !writer.wants_tetrahedra() && rests(box))
+        return can_copy(box) ? copy(box, samplers) : stay(box, tile, samplers, writer);
+      Report of_tile;
+      const bool gathered = may_march && !mostly_folds(box) && gather(box, tile, of_tile.paths);
+      if (!gathered && lattice_.frame().coarse) {
+        of_tile.paths.gathered += static_cast<std::uint64_t>(voxel_count(box));
+        write_intervals(box, tile, to, of_tile);
+        return of_tile;
+      }
+      if (!gathered) claim_all(box, tile, writer, of_tile.paths);
+      write(box, tile, samplers, writer, of_tile);
+      return of_tile;
+    };
+    Report report = for_each_tile<TileVoxels>(arena_, region, control, finished, is_copied,
+                                              [&](const Region& box, TileVoxels& tile) {
+                                                if (!kept) return make_tile(box, tile);
+                                                if (kept->is_changed(box)) kept->report(box) = make_tile(box, tile);
+                                                return kept->report(box);
+                                              });
     const FieldStatistics& statistics = lattice_.statistics();
     report.inverted = statistics.inverted;
     report.degenerate = statistics.degenerate;
@@ -127,7 +153,6 @@ class LatticeResampler final : public ForwardResampler {
     return report;
   }
 
- private:
   /// Whether a box lies within the undeformed lattice and everything that may reach it is at rest: then each of its
   /// voxels is owned by a cell at rest and by no other. (Something must reach the box, for what lay there may have
   /// moved away as a whole. Where one of the lattice's blocks in the box rests, its neighbours share vertices with it
@@ -388,6 +413,7 @@ class LatticeResampler final : public ForwardResampler {
   mutable Arena arena_;
   LatticeIndex lattice_;
   Coverage coverage_;
+  KeptTiles kept_;  ///< by `update`
   bool ready_ = false, wants_range_ = true;
   bool can_march_ = false, has_coverage_ = false;
 };

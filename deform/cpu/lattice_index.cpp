@@ -140,7 +140,7 @@ void LatticeIndex::load(std::size_t block, Block& into) const {
       const glm::i64vec3 first = into.first_cell + glm::i64vec3(0, y, z);
       const glm::vec3* displacement = field_.displacement + ((first.z * size.y + first.y) * size.x + first.x);
       for (int x = 0; x <= into.cells.x; ++x, ++vertex, ++displacement) {
-        *vertex = snapped(first + glm::i64vec3(x, 0, 0), *displacement);
+        *vertex = this->vertex(first + glm::i64vec3(x, 0, 0), *displacement);
         into.at_rest = into.at_rest && vertex->u == glm::i32vec3(0);
       }
     }

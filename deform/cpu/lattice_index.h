@@ -106,7 +106,15 @@ class LatticeIndex {
   /// @throws InputError for a vertex that is not finite or too far away
   Vertex vertex(const glm::i64vec3& at) const {
     const glm::i64vec3& size = field_.lattice->size;
-    return snapped(at, field_.displacement[(at.z * size.y + at.y) * size.x + at.x]);
+    return vertex(at, field_.displacement[(at.z * size.y + at.y) * size.x + at.x]);
+  }
+  /// A vertex of the lattice, snapped where another displacement puts it.
+  /// @throws InputError for one that is not finite or too far away
+  Vertex vertex(const glm::i64vec3& at, const glm::vec3& displacement) const {
+    Vertex vertex;
+    const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), displacement, vertex);
+    if (!done && !frame_.snap_vertex(at, displacement, vertex)) refuse_vertex(at);
+    return vertex;
   }
   bool has_inverted(std::size_t block) const { return inverted_[block] != 0; }
   /// Whether no vertex of a block is displaced, and every one lies at the whole step where `steps` has it.
@@ -125,12 +133,6 @@ class LatticeIndex {
   static bool reaches(const Box& box, const Region& region);
   Region blocks_near(const Region& region) const;
   static glm::i64vec3 unravel(std::size_t number, const glm::i64vec3& size);
-  Vertex snapped(const glm::i64vec3& at, const glm::vec3& displacement) const {
-    Vertex vertex;
-    const bool done = quick_.is_usable() && quick_.snap(glm::ivec3(at), displacement, vertex);
-    if (!done && !frame_.snap_vertex(at, displacement, vertex)) refuse_vertex(at);
-    return vertex;
-  }
   void find_blocks_at_rest(const Control& control);
   bool mostly_zero() const;
   void note_moving(const glm::vec3* row, const glm::i64vec3& vertex);

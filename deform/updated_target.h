@@ -3,9 +3,11 @@
 
 #pragma once
 
+// Private to resamplers.
+
 #include "deform/resampler.h"
 
-namespace tetwarp::cuda_detail {
+namespace tetwarp {
 
 /// What must be the same of a target, so that its output holds what the last update gave.
 struct UpdatedTarget {
@@ -20,7 +22,10 @@ struct UpdatedTarget {
         type(target.source.type),
         components(target.source.components),
         interpolation(target.interpolation),
-        background(target.background) {}
+        background(target.background),
+        has_padding(target.padding.has_value()),
+        padding_low(has_padding ? target.padding->low : 0),
+        padding_high(has_padding ? target.padding->high : 0) {}
   bool operator==(const UpdatedTarget&) const = default;
 
   const std::byte *source, *output;
@@ -31,6 +36,8 @@ struct UpdatedTarget {
   int components;
   Interpolation interpolation;
   double background;
+  bool has_padding;
+  double padding_low, padding_high;
 };
 
-}  // namespace tetwarp::cuda_detail
+}  // namespace tetwarp
