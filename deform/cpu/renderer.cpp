@@ -11,6 +11,7 @@
 #include "deform/render/ray_blocks.h"
 #include "deform/render/ray_frame.h"
 #include "deform/render/stale_patches.h"
+#include "deform/tile_regions.h"
 
 namespace tetwarp {
 
@@ -29,18 +30,18 @@ class CpuRenderer final : public Renderer {
     geometry_ = *volume.geometry;
     volume_ = volume;
     volume_.geometry = &geometry_;
-    ranges_ = block_ranges(volume_, limits_);
+    const Region all = whole(geometry_);
+    find_ranges({&all, 1});
     distances_.clear();
+    changed_.clear();
     tint_numbers_ = nullptr;
     stale_.forget();
   }
 
   void update_volume(std::span<const Region> changed, const Control&) override {
     require(volume_.voxels != nullptr, "no volume is set that could have changed: call set_volume first");
-    stale_.change(geometry_, changed);
-    if (changed.empty()) return;
-    ranges_ = block_ranges(volume_, limits_);
-    distances_.clear();
+    find_ranges(changed);
+    mark_blocks_of(geometry_, changed, changed_);
   }
 
   void set_style(const RenderStyle& style) override {
@@ -62,6 +63,13 @@ class CpuRenderer final : public Renderer {
   std::optional<glm::dvec3> pick(const ViewPlane& plane, int column, int row, const Control& control) override;
 
  private:
+  void find_ranges(std::span<const Region> changed) {
+    const std::vector<int> rows = block_rows_of(geometry_, changed);
+    if (rows.empty()) return;
+    find_block_ranges(volume_, rows, limits_, ranges_);
+    distances_are_stale_ = true;
+  }
+  void find_distances(const RayFrame& frame);
   void prepare(const RayFrame& frame, double step);
   template <class Use>
   void with_scene(const ViewPlane& plane, Use&& use);
@@ -77,7 +85,9 @@ class CpuRenderer final : public Renderer {
   std::vector<TransferEntry> table_;
   TransferIntegrals integrals_;
   ClearValues clear_;
-  std::vector<std::uint8_t> distances_;
+  std::vector<std::uint8_t> distances_;  ///< empty: not known yet
+  bool distances_are_stale_ = true;
+  std::vector<std::uint8_t> changed_;  ///< whether each block has changed since they were found; empty: none has
   const std::uint8_t* tint_numbers_ = nullptr;
   std::vector<TransferEntry> tint_colours_;
   double table_step_ = 0;  ///< mm between samples, for which the tables were made
@@ -92,7 +102,23 @@ void CpuRenderer::prepare(const RayFrame& frame, double step) {
     clear_ = clear_values(table_, frame);
     table_step_ = step;
   }
-  if (distances_.empty()) distances_ = block_distances(ranges_, ray_blocks(geometry_), frame, table_);
+  if (distances_are_stale_ || distances_.empty()) find_distances(frame);
+}
+
+/// Finds the distances of blocks anew. A sum or a composite shows nothing of blocks in which nothing is to be seen, so
+/// of those that have changed, only those are noted beside which something is to be seen, or was.
+void CpuRenderer::find_distances(const RayFrame& frame) {
+  const glm::ivec3 blocks = ray_blocks(geometry_);
+  const std::vector<std::uint8_t> before = std::exchange(distances_, block_distances(ranges_, blocks, frame, table_));
+  distances_are_stale_ = false;
+  if (changed_.empty()) return;
+  if (!before.empty() && frame.projection != Projection::maximum) {
+    for (std::size_t n = 0; n < changed_.size(); ++n)
+      if (std::min(before[n], distances_[n]) > 1) changed_[n] = 0;
+  }
+  stale_.change(geometry_, regions_of_tiles(changed_, glm::i64vec3(blocks), glm::i64vec3(kRayBlock), glm::i64vec3(0),
+                                            whole(geometry_)));
+  changed_.clear();
 }
 
 /// Casts the rays of a row of pixels.
@@ -183,9 +209,11 @@ void CpuRenderer::with_scene(const ViewPlane& plane, Use&& use) {
 void CpuRenderer::render(const ViewPlane& plane, std::span<std::uint8_t> rgb, const Control& control) {
   require_ready(volume_, style_, plane, rgb.size());
   if (control.stop.stop_requested()) throw Cancelled();
-  const std::optional<std::vector<int>> patches = stale_.take(plane);
-  if (patches) std::copy(picture_.begin(), picture_.end(), rgb.begin());
-  with_scene(plane, [&](const auto& scene) { cast(scene, plane, patches, rgb.data(), control); });
+  with_scene(plane, [&](const auto& scene) {
+    const std::optional<std::vector<int>> patches = stale_.take(plane);
+    if (patches) std::copy(picture_.begin(), picture_.end(), rgb.begin());
+    cast(scene, plane, patches, rgb.data(), control);
+  });
   if (!stale_.is_worth_keeping()) return;
   picture_.assign(rgb.begin(), rgb.end());
   stale_.keep(plane);

@@ -71,6 +71,19 @@ void spread(std::vector<std::uint8_t>& distances, const glm::ivec3& blocks, int 
   });
 }
 
+/// The blocks along one axis that contain values of some voxels of it: they reach them (`RayReach`).
+struct BlocksOf {
+  /// @param from, to  the voxels, half-open  @param size  voxels on the axis
+  BlocksOf(std::int64_t from, std::int64_t to, int size)
+      // A block contains values of the nearest voxels around it, too, so the first may lie one block lower.
+      : begin(std::max(static_cast<int>(from) / kRayBlock - 1, 0)),
+        end(std::min((static_cast<int>(to) + kRayBlock) / kRayBlock, (size + kRayBlock - 1) / kRayBlock)) {
+    while (begin < end && RayReach(begin, size).end <= from) ++begin;
+    while (begin < end && RayReach(end - 1, size).begin >= to) --end;
+  }
+  int begin, end;
+};
+
 }  // namespace
 
 glm::ivec3 ray_blocks(const Geometry& volume) { return (glm::ivec3(volume.size) + (kRayBlock - 1)) / kRayBlock; }
@@ -78,20 +91,11 @@ glm::ivec3 ray_blocks(const Geometry& volume) { return (glm::ivec3(volume.size) 
 std::vector<int> block_rows_of(const Geometry& volume, std::span<const Region> regions) {
   const glm::ivec3 size(volume.size), blocks = ray_blocks(volume);
   std::vector<std::uint8_t> is_of(static_cast<std::size_t>(blocks.y) * static_cast<std::size_t>(blocks.z));
-  const auto for_blocks = [](int count, int voxels, std::int64_t begin, std::int64_t end, const auto& work) {
-    // A block contains values of the nearest voxels around it, too, so the first may lie one block lower.
-    for (int n = std::max(static_cast<int>(begin) / kRayBlock - 1, 0); n < count; ++n) {
-      const RayReach reach(n, voxels);
-      if (reach.begin >= end) return;
-      if (reach.end > begin) work(static_cast<std::size_t>(n));
-    }
-  };
   for (const Region& region : regions) {
     if (is_empty(region)) continue;
-    for_blocks(blocks.z, size.z, region.begin.z, region.end.z, [&](std::size_t z) {
-      for_blocks(blocks.y, size.y, region.begin.y, region.end.y,
-                 [&](std::size_t y) { is_of[z * static_cast<std::size_t>(blocks.y) + y] = 1; });
-    });
+    const BlocksOf y(region.begin.y, region.end.y, size.y), z(region.begin.z, region.end.z, size.z);
+    for (int k = z.begin; k < z.end; ++k)
+      std::fill_n(is_of.begin() + k * blocks.y + y.begin, y.end - y.begin, std::uint8_t{1});
   }
   std::vector<int> rows;
   for (std::size_t row = 0; row < is_of.size(); ++row) {
@@ -100,20 +104,38 @@ std::vector<int> block_rows_of(const Geometry& volume, std::span<const Region> r
   return rows;
 }
 
-std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limits) {
+void mark_blocks_of(const Geometry& volume, std::span<const Region> regions, std::vector<std::uint8_t>& marked) {
+  const glm::ivec3 size(volume.size), blocks = ray_blocks(volume);
+  if (marked.empty())
+    marked.resize(static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y) *
+                  static_cast<std::size_t>(blocks.z));
+  for (const Region& region : regions) {
+    if (is_empty(region)) continue;
+    const BlocksOf x(region.begin.x, region.end.x, size.x), y(region.begin.y, region.end.y, size.y),
+        z(region.begin.z, region.end.z, size.z);
+    for (int k = z.begin; k < z.end; ++k) {
+      for (int j = y.begin; j < y.end; ++j)
+        std::fill_n(marked.begin() + (k * blocks.y + j) * blocks.x + x.begin, x.end - x.begin, std::uint8_t{1});
+    }
+  }
+}
+
+void find_block_ranges(const ConstVolumeView& volume, std::span<const int> rows, Limits limits,
+                       std::vector<BlockRange>& ranges) {
   const glm::ivec3 size = volume.geometry->size, blocks = ray_blocks(*volume.geometry);
   const auto width = static_cast<std::size_t>(blocks.x);
-  std::vector<BlockRange> ranges(width * static_cast<std::size_t>(blocks.y) * static_cast<std::size_t>(blocks.z));
+  ranges.resize(width * static_cast<std::size_t>(blocks.y) * static_cast<std::size_t>(blocks.z));
   cpu::Arena arena(limits);
   dispatch(volume.type, [&](auto voxel) {
     const auto* const voxels = reinterpret_cast<const decltype(voxel)*>(volume.voxels);
     arena.execute([&] {
-      tbb::parallel_for(0, blocks.y * blocks.z, [&](int n) {
-        find_ranges(voxels, size, {0, n % blocks.y, n / blocks.y}, ranges.data() + static_cast<std::size_t>(n) * width);
+      tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t n) {
+        const int row = rows[n];
+        find_ranges(voxels, size, {0, row % blocks.y, row / blocks.y},
+                    ranges.data() + static_cast<std::size_t>(row) * width);
       });
     });
   });
-  return ranges;
 }
 
 std::vector<int> opaque_before(const std::vector<TransferEntry>& table) {

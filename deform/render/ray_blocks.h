@@ -26,9 +26,15 @@ glm::ivec3 ray_blocks(const Geometry& volume);
 /// The rows of blocks along i that contain values of some regions of a volume, as z * blocks.y + y, rising.
 std::vector<int> block_rows_of(const Geometry& volume, std::span<const Region> regions);
 
-/// Least and largest value around each block, i fastest. Values that are not numbers are left out.
+/// Marks the blocks that contain values of some regions of a volume.
+/// @param marked  1 for these, else as before, i fastest; if empty, it becomes one 0 for each block first
+void mark_blocks_of(const Geometry& volume, std::span<const Region> regions, std::vector<std::uint8_t>& marked);
+
+/// Finds the least and largest value around each block, i fastest. Values that are not numbers are left out.
 /// @param volume  passed `require_renderable`; in host memory
-std::vector<BlockRange> block_ranges(const ConstVolumeView& volume, Limits limits);
+/// @param rows    rows of blocks that are wanted, as `block_rows_of` has them  @param ranges  of all blocks: written
+void find_block_ranges(const ConstVolumeView& volume, std::span<const int> rows, Limits limits,
+                       std::vector<BlockRange>& ranges);
 
 /// How many entries below each entry have opacity: kTransferEntries + 1 numbers, so that two of them tell whether any
 /// entry between has it.

@@ -41,6 +41,41 @@ TEST(RayBlocks, RowsOfRegionsAreThoseThatReachThem) {
   }
 }
 
+TEST(RayBlocks, BlocksOfRegionsAreThoseThatReachThem) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  Random random(test_seed(), 8102);
+  for (int n = 0; n < 100; ++n) {
+    const Geometry grid = unit_grid({random.integer(2, 40), random.integer(2, 40), random.integer(2, 40)});
+    const glm::ivec3 blocks = ray_blocks(grid), size(grid.size);
+    std::vector<Region> regions(static_cast<std::size_t>(random.integer(0, 3)));
+    for (Region& region : regions) {
+      for (int axis = 0; axis < 3; ++axis) {
+        region.begin[axis] = random.integer(0, grid.size[axis] - 1);
+        region.end[axis] = random.integer(region.begin[axis], std::min(region.begin[axis] + 12, grid.size[axis]));
+      }
+    }
+    const auto reaches = [&](const glm::ivec3& block) {
+      return std::any_of(regions.begin(), regions.end(), [&](const Region& region) {
+        for (int axis = 0; axis < 3; ++axis) {
+          const RayReach reach(block[axis], size[axis]);
+          if (std::max<std::int64_t>(reach.begin, region.begin[axis]) >=
+              std::min<std::int64_t>(reach.end, region.end[axis]))
+            return false;
+        }
+        return true;
+      });
+    };
+    std::vector<std::uint8_t> marked;
+    mark_blocks_of(grid, regions, marked);
+    std::size_t number = 0;
+    for (int z = 0; z < blocks.z; ++z)
+      for (int y = 0; y < blocks.y; ++y)
+        for (int x = 0; x < blocks.x; ++x, ++number)
+          ASSERT_EQ(marked[number] != 0, reaches({x, y, z})) << x << ' ' << y << ' ' << z;
+    EXPECT_EQ(marked.size(), number);
+  }
+}
+
 /// Whatever is seen of some values has one of `seen_values` between them; and more than an entry around what is seen
 /// there is none.
 TEST(RayBlocks, SeenValuesAreThoseOfBlocksThatAreNotEmpty) {

@@ -616,12 +616,15 @@ class WatchedVolume {
         region.begin[axis] = random_.integer(0, grid().size[axis] - 1);
         region.end[axis] = std::min(region.begin[axis] + random_.integer(1, most), grid().size[axis]);
       }
-      for (std::int64_t k = region.begin.z; k < region.end.z; ++k)
-        for (std::int64_t j = region.begin.y; j < region.end.y; ++j)
-          for (std::int64_t i = region.begin.x; i < region.end.x; ++i)
-            volume_.voxels[static_cast<std::size_t>((k * grid().size.y + j) * grid().size.x + i)] = value;
+      fill(region, value);
     }
     renderer_->update_volume(changed);
+  }
+  /// Gives a box of voxels a value, or nothing where it lies outside.
+  void put(Region region, float value) {
+    region = intersection(region, whole(grid()));
+    fill(region, value);
+    renderer_->update_volume({&region, 1});
   }
   void expect_picture(const ViewPlane& plane) {
     std::vector<std::uint8_t> found(3 * static_cast<std::size_t>(plane.width * plane.height));
@@ -631,6 +634,12 @@ class WatchedVolume {
 
  private:
   ConstVolumeView seen() const { return view(volume_); }
+  void fill(const Region& region, float value) {
+    for (std::int64_t k = region.begin.z; k < region.end.z; ++k)
+      for (std::int64_t j = region.begin.y; j < region.end.y; ++j)
+        for (std::int64_t i = region.begin.x; i < region.end.x; ++i)
+          volume_.voxels[static_cast<std::size_t>((k * grid().size.y + j) * grid().size.x + i)] = value;
+  }
 
   Random& random_;
   Volume<float> volume_;
@@ -664,6 +673,43 @@ TEST_P(Rendered, ShowsSmallChangesInOnePictureAfterAnother) {
       for (int update = 0; update < 2; ++update) watched.change(3, picture % 4 == 3 ? 30 : 3);
       if (random.chance(0.15)) watched.set_style(random.one_of(styles));
       if (random.chance(0.15)) watched.expect_picture(view_plane(random_camera(random), grid));
+      watched.expect_picture(plane);
+    }
+  }
+}
+
+/// A few voxels come and go where else nothing is to be seen, and around them voxels change that are not seen, but make
+/// others look different.
+TEST_P(Rendered, ShowsWhatComesAndGoesInEmptySpace) {
+  SCOPED_TRACE(seed_text(test_seed()));
+  RenderStyle lit = opaque_from(200, 0.3);
+  lit.transfer.gradient = 5;
+  const RenderStyle styles[] = {lit, lit, summed(100, 4000), brightest(300)};
+  for (std::uint64_t n = 0; n < test::test_cases(40); ++n) {
+    SCOPED_TRACE("case " + std::to_string(n));
+    Random random(test_seed(), 8600 + n);
+    WatchedVolume watched(GetParam(), unit_grid({40, 40, 40}), random);
+    watched.put(whole(watched.grid()), random.one_of({-1000.0f, NAN}));
+    RenderStyle style = random.one_of(styles);
+    style.step_voxels = 1;
+    watched.set_style(style);
+    const ViewPlane plane =
+        view_plane({.angle_deg = random.real(0, 360), .elevation_deg = random.real(-90, 90), .width = 50, .height = 50},
+                   watched.grid());
+    const auto near = [&](const glm::i64vec3& voxel, int apart) {
+      return voxel +
+             glm::i64vec3(random.integer(-apart, apart), random.integer(-apart, apart), random.integer(-apart, apart));
+    };
+    for (int thing = 0; thing < 3; ++thing) {
+      const glm::i64vec3 at = near(glm::i64vec3(20), 12), size(random.integer(1, 4));
+      watched.put({at, at + size}, 600);
+      watched.expect_picture(plane);
+      for (int change = 0; change < 6; ++change) {
+        const glm::i64vec3 voxel = near(at, 5);
+        watched.put({voxel, voxel + std::int64_t{1}}, static_cast<float>(random.integer(-1000, 190)));
+        watched.expect_picture(plane);
+      }
+      watched.put({at, at + size}, -1000);
       watched.expect_picture(plane);
     }
   }
