@@ -18,7 +18,7 @@
 #include "deform/field_check.h"
 #include "deform/lattice_or_mesh.h"
 #include "deform/target_check.h"
-#include "deform/updated_target.h"
+#include "deform/update/updated_target.h"
 
 namespace tetwarp {
 

@@ -8,7 +8,7 @@
 #include "cuda/owners/interval_kernel.cuh"
 #include "cuda/owners/interval_list.cuh"
 #include "cuda/runtime/fetch.h"
-#include "deform/tile_regions.h"
+#include "deform/update/tile_regions.h"
 
 namespace tetwarp::cuda_detail {
 

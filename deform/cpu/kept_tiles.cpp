@@ -10,7 +10,7 @@
 #include <glm/common.hpp>
 
 #include "deform/cpu/tiles.h"
-#include "deform/tile_regions.h"
+#include "deform/update/tile_regions.h"
 
 namespace tetwarp::cpu {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "deform/cpu/lattice_index.h"
-#include "deform/updated_target.h"
+#include "deform/update/updated_target.h"
 
 namespace tetwarp::cpu {
 

@@ -11,7 +11,7 @@
 #include "deform/render/ray_blocks.h"
 #include "deform/render/ray_frame.h"
 #include "deform/render/stale_patches.h"
-#include "deform/tile_regions.h"
+#include "deform/update/tile_regions.h"
 
 namespace tetwarp {
 

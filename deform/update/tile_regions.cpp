@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The Tetwarp authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "deform/tile_regions.h"
+#include "deform/update/tile_regions.h"
 
 #include "deform/geometry.h"
 
