@@ -32,7 +32,7 @@ __device__ float interpolate(const float (&v)[8], const glm::vec3& t) {
   return lerp(kRounding, t.z, along_y(0), along_y(4));
 }
 
-/// The eight voxels from one on. As words: their conversion to float is a faster one.
+/// The eight voxels from one on, as words.
 template <class V>
 __device__ void read_corners(const V* v, int dx, int dy, int dz, int (&corners)[8]) {
 #pragma unroll
