@@ -126,18 +126,23 @@ __device__ int mark_steep(const IntervalTile<Shape>& tile) {
   return marked;
 }
 
-/// Marks a row of which floats left the ends open. @return how many voxels
+/// Marks rows of which floats left the ends open, two lanes a row, each for one end: exact integers take long. A whole
+/// warp calls it.
+/// @param unsure   of this lane's row  @param is_any  whether there is one
+/// @return how many voxels, in the first lane of each row
 template <class Shape>
-__device__ int mark_in_doubt(const IntervalTile<Shape>& tile, unsigned unsure) {
+__device__ int mark_in_doubt(const IntervalTile<Shape>& tile, unsigned unsure, bool is_any) {
   const int slot = static_cast<int>(UnsureRow::Slot::get(unsure)), row = static_cast<int>(UnsureRow::Row::get(unsure));
   const RowInterval core{static_cast<int>(UnsureRow::Begin::get(unsure)),
                          static_cast<int>(UnsureRow::End::get(unsure))};
-  const unsigned number = tile.memory.numbers[slot];
-  const RowInterval in =
-      settled(core, UnsureRow::Before::get(unsure) != 0, UnsureRow::Behind::get(unsure) != 0, [&](int x) {
-        return owns(tile.task.shape, number, tile.voxels.begin + glm::ivec3(x, row % kTileJ, row / kTileJ), tile.signs);
-      });
-  return mark(tile, in, slot, row);
+  const bool is_behind = (tile.lane() & 1) != 0,
+             in_doubt = (is_behind ? UnsureRow::Behind::get(unsure) : UnsureRow::Before::get(unsure)) != 0;
+  const glm::ivec3 in_tile(is_behind ? core.end : core.begin - 1, row % kTileJ, row / kTileJ);
+  const bool is_owner =
+      is_any && in_doubt && owns(tile.task.shape, tile.memory.numbers[slot], tile.voxels.begin + in_tile, tile.signs);
+  const unsigned owners = __ballot_sync(kAllLanes, is_owner) >> tile.lane();
+  if (!is_any || is_behind) return 0;
+  return mark(tile, settled(core, (owners & 1) != 0, (owners & 2) != 0), slot, row);
 }
 
 /// Marks a row of which nothing is known, by a warp: a lane a voxel. @return how many voxels, in one lane
@@ -177,9 +182,10 @@ __device__ void mark_all(const IntervalTile<Shape>& tile) {
   __syncthreads();
   const unsigned unsure = tile.has_lost_rows() ? 0 : memory.unsure_count;
 #pragma unroll 1
-  for (unsigned n = static_cast<unsigned>(tile.thread); n < unsure; n += kTileThreads)
-    if (UnsureRow::Unknown::get(memory.unsure[n]) == 0) marked += mark_in_doubt(tile, memory.unsure[n]);
-  __syncwarp();
+  for (unsigned from = static_cast<unsigned>(tile.thread & ~31) / 2; from < unsure; from += kTileThreads / 2) {
+    const unsigned n = from + static_cast<unsigned>(tile.lane()) / 2, word = memory.unsure[min(n, unsure - 1)];
+    marked += mark_in_doubt(tile, word, n < unsure && UnsureRow::Unknown::get(word) == 0);
+  }
 #pragma unroll 1
   for (unsigned n = static_cast<unsigned>(tile.warp()); n < unsure; n += kTileJ)
     if (UnsureRow::Unknown::get(memory.unsure[n]) != 0) marked += mark_unknown(tile, memory.unsure[n]);

@@ -106,12 +106,13 @@ __device__ bool reaches_border(const IntervalTile<Shape>& tile, const int4 (&axe
   return is_far || !sink.surrounds(begin, end);
 }
 
-/// Takes the maps of the tetrahedra in the slots, in the place of their lines, from the first voxel of the tile on.
+/// Takes the maps of the tetrahedra in the slots, in the place of their lines, from the first voxel of the tile on. The
+/// last warps begin, for the first ones read the rows.
 template <class Shape, class Sink>
 __device__ void read_maps(const IntervalTile<Shape>& tile, const Sink& sink) {
   auto& memory = tile.memory;
 #pragma unroll 1
-  for (int slot = tile.thread; slot < tile.count; slot += kTileThreads) {
+  for (int slot = kTileThreads - 1 - tile.thread; slot < tile.count; slot += kTileThreads) {
     const Records& records = tile.task.records;
     const unsigned number = memory.numbers[slot];
     const int4 box = records.box(number);

@@ -226,13 +226,11 @@ TETWARP_HD inline RowFaces steep_faces(const RowLine (&lines)[4], int lower, int
   return of;
 }
 
-/// The interval of a row that lines left in doubt. @param owns  `owns(x)`: whether the tetrahedron owns that voxel,
-/// exactly
-template <class Owns>
-TETWARP_HD RowInterval settled(RowInterval core, bool before, bool behind, Owns&& owns) {
-  if (before && owns(core.begin - 1)) --core.begin;
-  if (behind && owns(core.end)) ++core.end;
-  return core;
+/// The interval of a row that lines left in doubt.
+/// @param before, behind  whether the tetrahedron owns the voxel before the core, and the one behind it: exactly where
+///                        they are in doubt, else false
+TETWARP_HD inline RowInterval settled(const RowInterval& core, bool before, bool behind) {
+  return {core.begin - (before ? 1 : 0), core.end + (behind ? 1 : 0)};
 }
 
 /// The rows of a tile that have the same y, by lines that begin at its first voxel.

@@ -91,10 +91,12 @@ void expect_lines(const Tetrahedron& t, const Tile& tile, Checked& checked) {
         ASSERT_NO_FATAL_FAILURE(expect_exact(LinesAlongZ::interval(ends), "certain"));
       } else {
         const LinesAlongZ::Doubt doubt = along.doubt(ends);
-        const RowInterval found = settled(doubt.core, doubt.before, doubt.behind, [&](int x) {
+        const auto owns = [&](int x) {
           int sides[4];
           return owns_exactly(t, (tile.first + glm::ivec3(x, y, z)) * kStepsPerVoxel, tile.signs, sides);
-        });
+        };
+        const RowInterval found =
+            settled(doubt.core, doubt.before && owns(doubt.core.begin - 1), doubt.behind && owns(doubt.core.end));
         ASSERT_NO_FATAL_FAILURE(expect_exact(found, "settled"));
       }
     }
